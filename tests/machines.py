@@ -7,7 +7,7 @@ its file. A row of `ROWS` says where one may vary more widely. Stiffnesses need 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from math import cos, pi, radians, sin
+from math import cos, isfinite, pi, radians, sin
 
 import pytest
 from hypothesis import settings
@@ -31,6 +31,8 @@ TOOL = 0.1
 """How far the tool point lies from the platform point P along each axis, m: what holds, holds at a tool as well."""
 UNCHANGED = ("load.", "limits.", "linear_density.", "tool.mass")
 """Sections on which neither K nor C depends."""
+ELASTIC = 1e5
+"""A stiffness between rigid and free, in any unit of SI."""
 TINY = 1e-12
 """Lengths (m) and angles (rad) below which a drawn one is 0."""
 SIZES = {"length", "area", "second moment of area", "elastic modulus"}
@@ -88,6 +90,23 @@ class Case:
     def freedoms(self) -> int:
         """Of the platform when all links are rigid and the actuators free: as many as task coordinates."""
         return sum(path.startswith("pose.") for path in values(self.machine))
+
+    @cached_property
+    def is_elastic(self) -> bool:
+        """Whether K is finite once every spring of the file is elastic: no rigid joint holds the platform alone."""
+        springs = dict.fromkeys(stiffness_paths(self.machine), ELASTIC)
+        return all(map(isfinite, respond(with_values(self.machine, springs)).stiffness.upper))
+
+
+def stiffness_paths(machine: Machine) -> list[str]:
+    """The leaf paths of all stiffnesses and rigidities."""
+    return [leaf for p in parameters(machine.family) if p.quantity.stiff and len(p.leaves) == 1 for leaf in p.leaves]
+
+
+def elastic_paths(machine: Machine) -> list[str]:
+    """Likewise, with the moduli of materials: all that K is proportional to."""
+    moduli = [p.path for p in parameters(machine.family) if p.quantity.kind == "elastic modulus"]
+    return stiffness_paths(machine) + moduli
 
 
 def load_without_limits(name: str, settings: Sequence[str] = ()) -> Machine:
@@ -170,21 +189,12 @@ KINDS = ("zhang-gosselin-4dof", "passive-leg-5dof-driven", "delta", "planar-3rrr
 one_of_each = pytest.mark.parametrize("case", [case for case in CASES if case.name in KINDS], ids=repr)
 """For what takes long and is about arithmetic rather than about machines."""
 every_machine = pytest.mark.parametrize("case", CASES, ids=repr)
+elastic_machine = pytest.mark.parametrize("case", [case for case in CASES if case.is_elastic], ids=repr)
+"""For what asks K to be finite: a plate on feet of rigid joints, written leg by leg, is rigid along some directions."""
 two_sided = pytest.mark.parametrize("case", [case for case in CASES if case.name not in ONE_SIDED], ids=repr)
 """For what holds where every leg pulls and pushes."""
 few = settings(max_examples=min(settings.default.max_examples, max(8, settings.default.max_examples * 2 // 5)))
 """For a test over every machine: what one machine hides, another shows."""
-
-
-def stiffness_paths(machine: Machine) -> list[str]:
-    """The leaf paths of all stiffnesses and rigidities."""
-    return [leaf for p in parameters(machine.family) if p.quantity.stiff and len(p.leaves) == 1 for leaf in p.leaves]
-
-
-def elastic_paths(machine: Machine) -> list[str]:
-    """Likewise, with the moduli of materials: all that K is proportional to."""
-    moduli = [p.path for p in parameters(machine.family) if p.quantity.kind == "elastic modulus"]
-    return stiffness_paths(machine) + moduli
 
 
 def decades(low: float, high: float) -> st.SearchStrategy[float]:

@@ -72,12 +72,28 @@ def test_lines_go_below_or_above_the_line_that_is_quoted(added, after, tmp_path)
     assert (tmp_path / "a.py").read_text("utf-8") == after
 
 
-@pytest.mark.parametrize("title", TITLES)
-def test_a_recipe_followed_word_by_word_works(title, tmp_path):
-    tree, there, said = tmp_path / "tree", tmp_path / "there", ""
+def copy_of_the_project(tree: Path) -> Path:
+    """A new folder with the package and its tests."""
     beside = shutil.ignore_patterns("*.pyc.*")  # what other processes are writing; what they have compiled comes along
     shutil.copytree(ROOT / "src", tree / "src", ignore=beside)
     shutil.copytree(ROOT / "tests", tree / "tests", ignore=shutil.ignore_patterns("*.pyc*"))
+    return tree
+
+
+def test_linters_find_nothing_after_all_recipes(tmp_path):
+    tree = copy_of_the_project(tmp_path / "tree")
+    for block in (block for title in TITLES for block in recipe(title) if block.words != ("recipe",)):
+        follow(block, tree)
+    shutil.copy(ROOT / "pyproject.toml", tree)
+    for words in (["check"], ["format", "--check"]):
+        ruff = [sys.executable, "-m", "ruff", *words, "--no-cache"]
+        done = subprocess.run(ruff, cwd=tree, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize("title", TITLES)
+def test_a_recipe_followed_word_by_word_works(title, tmp_path):
+    tree, there, said = copy_of_the_project(tmp_path / "tree"), tmp_path / "there", ""
     there.mkdir()
     steps = recipe(title)
     assert any(block.words == ("recipe",) for block in steps), "a recipe ends with a command that shows its result"

@@ -10,7 +10,7 @@ from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.kinetostatics.assembly import compliance_shares, stiffness_coefficients, stiffness_shares
 from kinetostat.machine.machine import springs
 from kinetostat.tolerances import CLOSING_ROUND_OFF
-from machines import CONTRASTING, decades, every_machine, few, regular
+from machines import CONTRASTING, decades, elastic_machine, every_machine, few, regular
 from numeric import (
     U,
     array,
@@ -122,7 +122,7 @@ def test_the_load_in_a_spring_is_the_same_from_the_wrench_and_from_the_motion(ca
     assert np.all(np.linalg.norm((found - expected) * scale, axis=0) <= 1e-9 * size)
 
 
-@every_machine
+@elastic_machine
 @few
 @given(data=st.data())
 def test_what_the_platform_would_gain_and_lose(case, data):
@@ -147,7 +147,7 @@ def test_what_the_platform_would_gain_and_lose(case, data):
         assert least >= -(PARTED + lost(whole)) * np.linalg.norm(reduced(whole, before, kind))
 
 
-@every_machine
+@elastic_machine
 @few
 @given(data=st.data())
 def test_a_spring_moves_the_platform_as_its_flexibility_says(case, data):

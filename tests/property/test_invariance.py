@@ -12,7 +12,16 @@ from geometry import displacements, vectors
 from kinetostat.algebra.vector import ZERO
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.parameters import parameters, values, with_values
-from machines import CONTRASTING, MODERATE, every_machine, few, regular, regular_machines, stiffness_paths
+from machines import (
+    CONTRASTING,
+    MODERATE,
+    elastic_machine,
+    every_machine,
+    few,
+    regular,
+    regular_machines,
+    stiffness_paths,
+)
 from numeric import (
     answer,
     array,
@@ -57,7 +66,7 @@ def assert_as_regular(found, response):
     assert found.singularity_margin == pytest.approx(response.singularity_margin, rel=lost(response) + INVARIANT)
 
 
-@every_machine
+@elastic_machine
 @every_contrast
 @few
 @given(data=st.data(), motion=displacements(2.0))
@@ -68,7 +77,7 @@ def test_the_machine_moved_as_a_whole(case, stiffness, data, motion):
     assert_as_regular(found, response)
 
 
-@every_machine
+@elastic_machine
 @few
 @given(data=st.data(), offset=vectors(0.3))
 def test_another_reference_point(case, data, offset):
@@ -78,7 +87,7 @@ def test_another_reference_point(case, data, offset):
     assert_transported(found, response, np.eye(3), vector(offset))
 
 
-@every_machine
+@elastic_machine
 @few
 @given(data=st.data(), motion=displacements(0.5))
 def test_moved_and_seen_from_the_origin(case, data, motion):
@@ -87,7 +96,7 @@ def test_moved_and_seen_from_the_origin(case, data, motion):
     assert_transported(found, response, matrix(motion.rotation), -vector(motion.apply(response.reference)))
 
 
-@every_machine
+@elastic_machine
 @few
 @given(data=st.data())
 def test_the_tool_lies_on_the_platform(case, data):
@@ -101,7 +110,7 @@ def test_the_tool_lies_on_the_platform(case, data):
     assert_transported(response, at_p, np.eye(3), matrix(platform.rotation) @ offset)
 
 
-@every_machine
+@elastic_machine
 @few
 @given(data=st.data())
 def test_the_order_of_the_legs(case, data):
@@ -112,7 +121,7 @@ def test_the_order_of_the_legs(case, data):
     assert_as_regular(found, response)
 
 
-@every_machine
+@elastic_machine
 @few
 @given(data=st.data(), factor=st.floats(0.1, 10.0))
 def test_the_length_that_scales_rows(case, data, factor):
@@ -172,7 +181,7 @@ def unit_of_stiffness(metre, newton):
     return np.outer(motion, motion) / (newton * metre)
 
 
-@every_machine
+@elastic_machine
 @few
 @given(data=st.data(), metre=st.sampled_from([1e-9, 1e-3, 1e3, 1e6]), newton=st.sampled_from([1.0, 1e3]))
 def test_the_units_of_length_and_of_force(case, metre, newton, data):

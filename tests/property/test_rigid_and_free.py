@@ -14,7 +14,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import springs
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.tolerances import ROUND_OFF_OF_COMPLIANCE
-from machines import CASES, every_machine, few, regular, stiffness_paths
+from machines import CASES, elastic_machine, every_machine, few, regular, stiffness_paths
 from numeric import (
     BLOCKS,
     U,
@@ -95,7 +95,7 @@ def test_rigid_is_the_exact_limit(case, data):
     assert_blocks_close(exact, np.where(zero | zero[:, None], 0.0, limit), 1e-12 + lost(stiff), before)
 
 
-@every_machine
+@elastic_machine
 @few
 @given(data=st.data())
 def test_free_is_the_limit(case, data):
@@ -143,7 +143,7 @@ def test_at_the_reference_design_very_stiff_is_rigid_to_nine_digits(case, path):
     assert_blocks_close(array(stiff.compliance), array(rigid.compliance), 1e-9, scale_of=present)
 
 
-@every_machine
+@elastic_machine
 @few
 @given(data=st.data())
 def test_a_rigid_spring_adds_nothing_to_c_and_is_never_nan(case, data):
@@ -166,7 +166,7 @@ def test_a_rigid_spring_adds_nothing_to_c_and_is_never_nan(case, data):
     assert np.all(np.linalg.norm(against @ compliance, axis=1) <= 1e-9 * np.linalg.norm(before))
 
 
-@every_machine
+@elastic_machine
 @few
 @given(data=st.data())
 def test_a_free_spring_leaves_k_finite_and_frees_just_what_it_moves(case, data):
@@ -196,7 +196,7 @@ def test_a_free_spring_leaves_k_finite_and_frees_just_what_it_moves(case, data):
         assert np.max(abs(error)) <= ROUNDINGS * U * trace_product(found)
 
 
-@every_machine
+@elastic_machine
 def test_all_rigid_does_not_move_and_all_free_does_not_resist(case):
     response = respond(case.machine)
     every = range(len(springs(response.configuration)))
@@ -208,7 +208,7 @@ def test_all_rigid_does_not_move_and_all_free_does_not_resist(case):
     assert free.status == Status.SINGULAR or np.all(np.diag(array(free.compliance))[exist] == math.inf)
 
 
-@every_machine
+@elastic_machine
 @few
 @given(data=st.data())
 def test_a_rigid_machine_with_free_actuators_keeps_its_freedoms(case, data):

@@ -10,7 +10,7 @@ from kinetostat.kinetostatics.assembly import flexible_stiffness
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import springs
 from kinetostat.machine.parameters import values, with_values
-from machines import CONTRASTING, MODERATE, elastic_paths, every_machine, few, machines, regular
+from machines import CONTRASTING, MODERATE, elastic_machine, elastic_paths, every_machine, few, machines, regular
 from numeric import (
     U,
     array,
@@ -55,7 +55,7 @@ def outside(response, matrix):
     return np.max(abs(apart)) / np.max(abs(matrix))
 
 
-@every_machine
+@elastic_machine
 @every_contrast
 @few
 @given(data=st.data())
@@ -69,7 +69,7 @@ def test_both_are_symmetric_and_positive(case, stiffness, data):
     assert outside(response, array(response.stiffness)) <= 100 * U
 
 
-@every_machine
+@elastic_machine
 @few
 @given(data=st.data())
 def test_they_are_inverse_at_moderate_contrast(case, data):
@@ -78,7 +78,7 @@ def test_they_are_inverse_at_moderate_contrast(case, data):
     assert np.max(abs(product_error(response))) < INVERSE
 
 
-@every_machine
+@elastic_machine
 @few
 @given(data=st.data())
 def test_they_are_inverse_at_any_contrast_to_what_their_terms_allow(case, data):
@@ -109,7 +109,7 @@ def test_twice_the_stiffness_is_twice_k_and_half_c(case, stiffness, data):
         np.testing.assert_allclose(array(double), 2.0 * array(single), rtol=0, atol=UNDERFLOW)
 
 
-@every_machine
+@elastic_machine
 @few
 @given(data=st.data())
 def test_more_stiffness_anywhere_is_never_softer_in_any_direction(case, data):
@@ -129,7 +129,7 @@ def test_more_stiffness_anywhere_is_never_softer_in_any_direction(case, data):
             assert np.trace(high) > np.trace(low)
 
 
-@every_machine
+@elastic_machine
 @few
 @given(data=st.data())
 def test_the_sum_over_legs_is_the_same_stiffness(case, data):
