@@ -77,8 +77,8 @@ def test_statements_hold_at_the_poses_that_they_say(paper):
     about_z = next(s for s in statements(paper) if s.topic == "compliance" and s.text.startswith("About z "))
     own = [guidelines(load(MACHINE, [f"pose.x={x}", f"pose.z={z}"])) for x in (-0.02, -0.01, 0, 0.01, 0.02)
            for z in (0.66, 0.67, 0.68, 0.69, 0.70)]  # fmt: skip
-    masks = [found.here.shares[:3, 2, 0] >= 0.01 for found in own]
-    here = paper.here.shares[:3, 2, 0] >= 0.01
+    masks = [found.roles.shares[:3, 2, 0] >= 0.01 for found in own]
+    here = paper.roles.shares[:3, 2, 0] >= 0.01
     assert 0.0 < about_z.holds < 1.0
     assert about_z.holds == pytest.approx(np.mean([(mask == here).all() for mask in masks]))
     base = next(move for move in paper.parameters if move.path == "geometry.base_radius")
@@ -90,8 +90,8 @@ def test_the_worst_pose_decides_the_limit_over_the_grid(paper, data):
     k = [one.name for one in paper.elements].index("links together")
     corners = [guidelines(load(MACHINE, [f"pose.x={x}", f"pose.z={z}"])) for x in (-0.02, 0.02) for z in (0.66, 0.70)]
     worst = element(data, "links together")["over_grid"]["rigid_from_factor"]["rx"]
-    assert worst >= max(found.here.rigid[k, 0, 0] for found in corners) * (1 - 1e-12)
-    assert worst >= paper.here.rigid[k, 0, 0]
+    assert worst >= max(found.roles.rigid[k, 0, 0] for found in corners) * (1 - 1e-12)
+    assert worst >= paper.roles.rigid[k, 0, 0]
 
 
 @pytest.mark.parametrize("name", ["hexapod", "tripteron", "delta", "planar-3rpr", "passive-leg-4dof-driven"])

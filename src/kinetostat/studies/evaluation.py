@@ -7,7 +7,7 @@ compared and memory is found for the results. `Buffers` do all that once.
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -45,6 +45,13 @@ MATRICES = {"K": "stiffness", "C": "compliance"}
 """Beginning of the names of entries, by the name of the matrix."""
 MACHINES_KEPT = 8
 """Machines, by identity, whose facts that do not depend on the poses are kept: as many as a program mostly compares."""
+
+
+class PoseCount(NamedTuple):
+    """Number of poses that have an answer, and of all poses that were asked about."""
+
+    answered: int
+    total: int
 
 
 @dataclass(frozen=True)

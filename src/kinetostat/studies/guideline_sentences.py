@@ -1,6 +1,7 @@
 """Guidelines in plain sentences, each with the share of the poses of a grid at which it holds.
 
-Each kind of statement has a function, in the order of the paper's section 4.2. Nothing is derived here.
+Each kind of statement has a function, in the order in which D. Zhang and C. M. Gosselin (2002) derive theirs in section
+4.2. Nothing is derived here.
 """
 
 import math
@@ -17,9 +18,11 @@ from kinetostat.studies.guidelines import Guidelines, ParameterEffect, Roles
 from kinetostat.tolerances import NO_ROLE
 
 DECIDING_SHARE = 0.01
-"""Share of an entry of C from which on an element is named as one that decides it."""
+"""Share of an entry of C from which on an element is named as one that decides it: a lesser one is below the usual
+uncertainty of a stiffness."""
 RATIO_OF_LIMITS = 10.0
-"""Ratio of limits of rigidity above which directions get a limit each; within it, the greatest serves for all."""
+"""Ratio of limits of rigidity above which directions get a limit each. Within it the greatest serves for all: twice as
+much would ask for parts that are needlessly stiff, half would write a clause for nearly every direction."""
 LEAST_EFFECT = 0.005
 """Percent per percent below which a sentence says that a parameter has no effect: some hundredth of a usual effect."""
 MOST_PARAMETERS = 8
@@ -47,32 +50,32 @@ class Statement:
 
 def statements(answer: Guidelines) -> list[Statement]:
     """Write all guidelines at the pose of the file, with the share of the grid over which they hold if there is one."""
-    if answer.here is None:
+    if answer.roles is None:
         return []
     return [
-        *_sources_of_compliance(answer, answer.here),
-        *_weakest_elements(answer, answer.here),
-        *_limits_of_rigidity(answer, answer.here),
+        *_sources_of_compliance(answer, answer.roles),
+        *_weakest_elements(answer, answer.roles),
+        *_limits_of_rigidity(answer, answer.roles),
         *_effects_of_parameters(answer),
     ]
 
 
-def _sources_of_compliance(answer: Guidelines, here: Roles) -> Iterator[Statement]:
+def _sources_of_compliance(answer: Guidelines, roles: Roles) -> Iterator[Statement]:
     """Statements on the elements from which the compliance of each direction comes; alike directions share one."""
-    single, over = _elements_without_parts(answer), answer.over_grid
+    basic, over_grid = _elements_without_parts(answer), answer.roles_over_grid
     groups: dict[tuple[bytes, float | None], list[int]] = {}
-    for i in _compliant_directions(here):
-        mask = here.shares[single, i] >= DECIDING_SHARE
-        holds = None if over is None else _share_of_poses((over.shares[single, i] >= DECIDING_SHARE) == mask)
+    for i in _compliant_directions(roles):
+        mask = roles.shares[basic, i] >= DECIDING_SHARE
+        holds = None if over_grid is None else _share_of_poses((over_grid.shares[basic, i] >= DECIDING_SHARE) == mask)
         groups.setdefault((mask.tobytes(), holds), []).append(i)
     for (_, holds), directions in groups.items():
-        shares = here.shares[single][:, directions, 0]
+        shares = roles.shares[basic][:, directions, 0]
         deciding = [
             f"{_name_in_sentence(answer, k)} ({_percents(row.min(), row.max())})"
-            for k, row in zip(single, shares, strict=True)
+            for k, row in zip(basic, shares, strict=True)
             if row.max() >= DECIDING_SHARE
         ]
-        silent = [_name_in_sentence(answer, k) for k, row in zip(single, shares, strict=True) if row.max() <= NO_ROLE]
+        silent = [_name_in_sentence(answer, k) for k, row in zip(basic, shares, strict=True) if row.max() <= NO_ROLE]
         aside = f", not from {_enumeration(silent, 'or')}" if silent else ""
         text = f"{_directions_in_words(answer, directions)} the compliance comes from {_enumeration(deciding)}{aside}."
         yield Statement("compliance", _with_capital(text), holds)
@@ -82,28 +85,28 @@ def _sources_of_compliance(answer: Guidelines, here: Roles) -> Iterator[Statemen
             yield Statement("compliance", f"The platform is {word} {_directions_in_words(answer, directions)}.", None)
 
 
-def _weakest_elements(answer: Guidelines, here: Roles) -> Iterator[Statement]:
+def _weakest_elements(answer: Guidelines, roles: Roles) -> Iterator[Statement]:
     """The element whose doubling gains most, direction by direction."""
-    single, over = _elements_without_parts(answer), answer.over_grid
-    if not single:
+    basic, over_grid = _elements_without_parts(answer), answer.roles_over_grid
+    if not basic:
         return
-    best, gains = _most_gaining(here.gains[single])[:, 0], here.gains[single, :, 0]
-    for k in dict.fromkeys(best[_compliant_directions(here)].tolist()):
-        directions = [i for i in _compliant_directions(here) if best[i] == k]
-        row, plural = gains[k, directions], _is_plural(answer.elements[single[k]])
+    best, gains = _most_gaining(roles.gains[basic])[:, 0], roles.gains[basic, :, 0]
+    for k in dict.fromkeys(best[_compliant_directions(roles)].tolist()):
+        directions = [i for i in _compliant_directions(roles) if best[i] == k]
+        row, plural = gains[k, directions], _is_plural(answer.elements[basic[k]])
         text = (
-            f"{_directions_in_words(answer, directions)} {_name_in_sentence(answer, single[k])} "
+            f"{_directions_in_words(answer, directions)} {_name_in_sentence(answer, basic[k])} "
             f"{'are' if plural else 'is'} weakest: doubling {'their' if plural else 'its'} stiffness would cut the "
             f"compliance by {_percents(row.min(), row.max())}."
         )
-        holds = None if over is None else _share_of_poses(_most_gaining(over.gains[single])[directions] == k)
+        holds = None if over_grid is None else _share_of_poses(_most_gaining(over_grid.gains[basic])[directions] == k)
         yield Statement("weakest", _with_capital(text), holds)
 
 
-def _limits_of_rigidity(answer: Guidelines, here: Roles) -> Iterator[Statement]:
+def _limits_of_rigidity(answer: Guidelines, roles: Roles) -> Iterator[Statement]:
     """The stiffness from which on each element may be taken as rigid; directions with similar limits share one."""
     for k, element in enumerate(answer.elements):
-        factors = {i: float(here.rigid[k, i, 0]) for i in _compliant_directions(here) if here.rigid[k, i, 0] > 0.0}
+        factors = {i: float(roles.rigid[k, i, 0]) for i in _compliant_directions(roles) if roles.rigid[k, i, 0] > 0.0}
         if element.actuated or not factors:
             continue
         clauses = []
@@ -135,10 +138,10 @@ def _clusters(factors: Mapping[int, float]) -> list[list[int]]:
 
 def _limit_over_grid(answer: Guidelines, k: int, directions: Sequence[int]) -> str:
     """A sentence on the limit that is enough at every pose of the grid, in those directions in which there is one."""
-    over = answer.over_grid
-    if over is None:
+    over_grid = answer.roles_over_grid
+    if over_grid is None:
         return ""
-    most = {i: float(over.rigid[k, i].max()) for i in directions}
+    most = {i: float(over_grid.rigid[k, i].max()) for i in directions}
     finite = [i for i in directions if most[i] < math.inf]
     if not finite:
         return ""
@@ -182,12 +185,12 @@ def share_with_same_signs(effect: ParameterEffect) -> float | None:
 def _elements_without_parts(answer: Guidelines) -> list[int]:
     """Numbers of the elements that are not made of others."""
     springs_before: set[int] = set()
-    single = []
+    basic = []
     for k, element in enumerate(answer.elements):
         if not springs_before.issuperset(element.springs):
-            single.append(k)
+            basic.append(k)
         springs_before.update(element.springs)
-    return single
+    return basic
 
 
 def _compliant_directions(roles: Roles) -> list[int]:
@@ -195,9 +198,9 @@ def _compliant_directions(roles: Roles) -> list[int]:
     return [i for i in range(roles.shares.shape[1]) if len(roles.shares) and np.isfinite(roles.shares[:, i, 0]).all()]
 
 
-def _share_of_poses(true: Mask) -> float:
+def _share_of_poses(is_true: Mask) -> float:
     """Share of the poses at which all rows [rows x poses] are true."""
-    return float(true.all(axis=0).mean())
+    return float(is_true.all(axis=0).mean())
 
 
 def _most_gaining(gains: Array) -> Integers:

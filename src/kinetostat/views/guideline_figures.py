@@ -13,7 +13,7 @@ from kinetostat.arrays import Array
 from kinetostat.kinetostatics.elements import Element
 from kinetostat.machine.machine import setting_of
 from kinetostat.machine.parameters import with_leg
-from kinetostat.studies.guidelines import EXCESS, Guidelines, stiffening
+from kinetostat.studies.guidelines import EXCESS_OF_RIGID, Guidelines, stiffening
 from kinetostat.views.figures import COLOURS, DASHES, GUIDE_COLOUR, grid_shape, new_figure, panel_grid
 from kinetostat.views.guidelines import unit_of_limits
 from kinetostat.views.question import Drawing
@@ -37,12 +37,12 @@ stiffness; in percent."""
 
 def guideline_figures(answer: Guidelines) -> dict[str, Drawing]:
     """Return the figures by name: "design", and "rigid" where elements have a limit of rigidity."""
-    if answer.here is None:
+    if answer.roles is None:
         return {}
     draw = partial(design_figure, answer)
     effect = Drawing("Effect of each parameter on each direction.", draw, minor=True, file="guidelines-design")
     drawings = {"design": effect} if answer.parameters else {}
-    limited = _elements_with_limits(answer.elements, answer.here.rigid)
+    limited = _elements_with_limits(answer.elements, answer.roles.rigid)
     caption = "Stiffness in each direction over the stiffness of each element, relative to that with the element rigid."
     if limited:
         drawings["rigid"] = Drawing(caption, partial(rigid_figure, answer, limited), file="guidelines-rigid")
@@ -85,7 +85,7 @@ def rigid_figure(
             _draw_curves(panel, answer, element, limits)
         styles = zip(answer.components, COLOURS, DASHES, strict=False)
         curves = [Line2D([], [], color=colour, linestyle=dash, label=name) for name, colour, dash in styles]
-        near = f"within {100.0 * EXCESS:g} %"
+        near = f"within {100.0 * EXCESS_OF_RIGID:g} %"
         dot = Line2D([], [], color=GUIDE_COLOUR, marker="o", markersize=4, linestyle="", label=near)
         figure.legend(handles=[*curves, dot], loc="outside right center", title="direction")
     return figure
@@ -105,7 +105,7 @@ def _draw_curves(panel: Axes, answer: Guidelines, element: Element, limits: Arra
             continue
         panel.plot(present * factors, 100.0 * curve, linestyle=dash, color=colour, linewidth=1.3)
         if 0.0 < limit < math.inf:
-            panel.plot(present * limit, 100.0 / (1.0 + EXCESS), "o", color=colour, markersize=4, zorder=3)
+            panel.plot(present * limit, 100.0 / (1.0 + EXCESS_OF_RIGID), "o", color=colour, markersize=4, zorder=3)
     if not rigid_now:
         panel.axvline(present, color="#888888", linewidth=0.8, linestyle=":")
         panel.text(present, HEIGHT_OF_NOW, " now", fontsize=6.5, color="#666666", ha="left")

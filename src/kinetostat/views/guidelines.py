@@ -19,7 +19,7 @@ from kinetostat.studies.guideline_sentences import (
     share_with_same_signs,
     statements,
 )
-from kinetostat.studies.guidelines import EXCESS, Guidelines, Roles, guidelines
+from kinetostat.studies.guidelines import EXCESS_OF_RIGID, Guidelines, Roles, guidelines
 from kinetostat.views.data_forms import stiffness_of_spring
 from kinetostat.views.question import (
     FIRST_FIELDS,
@@ -56,7 +56,7 @@ def _lines(answer: Guidelines) -> Lines:
     for statement in statements(answer):
         extent = "" if statement.holds is None else f" [{over_poses(statement.holds)}]"
         yield TOPICS[statement.topic], f"{statement.text}{extent}"
-    if answer.here is not None:
+    if answer.roles is not None:
         yield "Percent", answer.meaning
         yield from (("Others", sentence) for sentence in _left_out(answer))
 
@@ -73,8 +73,8 @@ def _left_out(answer: Guidelines) -> Iterator[str]:
         yield f"{words_on_omitted(hidden)} (--full shows them)."
     if answer.without_influence:
         yield f"No direction depends on {_few_paths(answer.without_influence)}."
-    for reason in dict.fromkeys(why for _, why in answer.left_out):
-        yield f"Omitted {reason}: {_few_paths([path for path, why in answer.left_out if why == reason])}."
+    for reason in dict.fromkeys(why for _, why in answer.parameters_left_out):
+        yield f"Omitted {reason}: {_few_paths([path for path, why in answer.parameters_left_out if why == reason])}."
 
 
 def _few_paths(paths: Sequence[str]) -> str:
@@ -84,13 +84,13 @@ def _few_paths(paths: Sequence[str]) -> str:
 
 
 def _tables(answer: Guidelines, full: bool) -> Iterator[FittedTable]:
-    if answer.here is None:
+    if answer.roles is None:
         return
     if answer.stiffness_equations is not None:
         yield _equation_table(answer, answer.stiffness_equations)
     if answer.elements:
-        yield _element_table(answer, answer.here)
-        yield _limit_table(answer, answer.here)
+        yield _element_table(answer, answer.roles)
+        yield _limit_table(answer, answer.roles)
     if answer.parameters:
         yield _effect_table(answer, len(answer.parameters) if full else MOST_PARAMETERS)
 
@@ -124,7 +124,7 @@ def _limit_table(answer: Guidelines, roles: Roles) -> FittedTable:
     An element with several stiffnesses has no single value: its limits are multiples of the present stiffness.
     """
     title = (
-        f"Stiffness from which an element counts as rigid, within {100.0 * EXCESS:g} % "
+        f"Stiffness from which an element counts as rigid, within {100.0 * EXCESS_OF_RIGID:g} % "
         f"({NO_EFFECT} any stiffness suffices; never: nothing else is compliant in that direction)"
     )
     table = numeric_table(title, "element", ["now", *answer.components])
@@ -164,7 +164,7 @@ def _limit_text(value: float) -> str:
 
 def _effect_table(answer: Guidelines, count: int) -> FittedTable:
     """Return the effect of the first parameters on each direction."""
-    grid = bool(answer.poses[0])
+    grid = bool(answer.poses.answered)
     title = "Effect of 1 % more (of an angle: 0.01 rad more), percent stiffer ▲ or softer ▼"
     if grid:
         title += "; poses: share of the poses at which all arrows of the row point the same way as here"
@@ -186,7 +186,7 @@ def _effect_text(percent: float) -> Text:
 
 def _elements(answer: Guidelines) -> list[dict[str, Any]]:
     """Return the elements with their roles at the pose and over the grid, by direction."""
-    at_pose, over = answer.here, answer.over_grid
+    at_pose, over = answer.roles, answer.roles_over_grid
     if at_pose is None:
         return []
     by_direction = partial(_by_direction, answer)
@@ -217,7 +217,7 @@ def _elements(answer: Guidelines) -> list[dict[str, Any]]:
 
 
 def _at_pose(roles: Array) -> Array:
-    """Take roles [elements x components x poses] at the only pose of `Guidelines.here` [elements x components]."""
+    """Take roles [elements x components x poses] at the only pose of `Guidelines.roles` [elements x components]."""
     return roles[:, :, 0]
 
 
@@ -291,7 +291,7 @@ GUIDELINES = Description(
         *FIRST_FIELDS,
         LOADS_LEFT_OUT,
         Field("components"),
-        Field("rigid_within", lambda _answer: EXCESS),
+        Field("rigid_within", lambda _answer: EXCESS_OF_RIGID),
         Field(
             "compliance_diagonal",
             lambda answer: answer.compliance_diagonal if answer.compliance_diagonal.size else None,
@@ -300,7 +300,7 @@ GUIDELINES = Description(
         Field("stiffness_equations", _equations),
         Records("parameters", "parameter", PARAMETER, _parameters),
         Field("without_influence"),
-        Field("left_out", lambda answer: dict(answer.left_out)),
+        Field("left_out", lambda answer: dict(answer.parameters_left_out)),
         Field("statements", statements),
         Field("grid", _grid),
     ),
