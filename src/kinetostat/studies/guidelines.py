@@ -44,8 +44,8 @@ from kinetostat.studies.poses import chosen_axes, grid_of
 from kinetostat.studies.sensitivity import (
     Sensitivity,
     greatest_of,
-    measure_of,
     notes,
+    percent_base,
     relative_sensitivity,
     sensitivity,
 )
@@ -422,7 +422,7 @@ def with_signs_over_grid(
     for effect in effects:
         leaves = by_path[effect.path].leaves
         rows = [row_of_leaf[leaf] for leaf in leaves]
-        sizes = np.array([measure_of(by_path[leaf].quantity.kind, numbers[leaf], length)[0] for leaf in leaves])
+        sizes = np.array([percent_base(by_path[leaf].quantity.kind, numbers[leaf], length).amount for leaf in leaves])
         percents = relative_sensitivity(answer.gradients[:, rows], sizes[:, None], answer.values[:, None])
         stiffening_percents = -np.nansum(percents, axis=1)[:, has_answer]
         stiffer = (stiffening_percents > LEAST_INFLUENCE).mean(axis=1)

@@ -6,7 +6,8 @@ Tables and bars of it are in `views`; the derivatives come from `engine.derivati
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
-from typing import TYPE_CHECKING
+from enum import Flag, StrEnum, auto
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -25,7 +26,6 @@ from kinetostat.kinetostatics.quantities import (
     rest_numbers,
 )
 from kinetostat.kinetostatics.response import Response
-from kinetostat.machine.common_tables import DYNAMIC_FIELDS
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, data_name, parameters, values
 from kinetostat.spec.arguments import checked
@@ -47,16 +47,70 @@ from kinetostat.units import KINDS
 if TYPE_CHECKING:
     import pandas as pd
 
-WITHOUT_INFLUENCE = (
-    "load.", "limits.", "tool.payload", "bending_rigidity.", "expansion.", "temperature_rise.",
-)  # fmt: skip
-"""Beginnings of the fields on which no index of the free machine depends: loads, limits, buckling and growth."""
-WITHOUT_DERIVATIVES = ("limits.", "bending_rigidity.", "damping.", "cutting.", "cables.", "drives.rotor_damping")
-"""Beginnings of the fields on which no quantity with derivatives depends, but lost motion on some of them."""
-FIELDS_OF_LOST_MOTION = ("drives.", "servo.", "damping.")
-"""Beginnings of the fields on which lost motion depends."""
-TENSION_BOUNDS = ("load.min_tension", "load.max_tension")
-"""Fields on which nothing about the loaded machine depends; chosen tensions have no derivatives."""
+
+class _Subject(Flag):
+    """Subjects that quantities may have, and on which fields may act."""
+
+    STIFFNESS = auto()
+    """C and K of the free machine, from its geometry and its springs; every quantity has this subject."""
+    MASS = auto()
+    """The mass of all that moves."""
+    INERTIA = auto()
+    """Vibrations, and what drives carry when the machine accelerates."""
+    LOST_MOTION = auto()
+    """The error of the tool where drives reverse."""
+    ACTUATOR_LOADS = auto()
+    """The loads of actuators of the free machine, to first order, and what drives can do beside these."""
+    REST = auto()
+    """The machine at rest under its loads."""
+
+    @classmethod
+    def of(cls, machine: Machine, names: Sequence[str]) -> "_Subject":
+        """The subjects of some quantities of a machine."""
+        quantities = [QUANTITIES[name] for name in names]
+        subjects = cls.STIFFNESS
+        if "mass" in names:
+            subjects |= cls.MASS
+        if needs_masses(names) or any(quantity.modal for quantity in quantities):
+            subjects |= cls.INERTIA
+        if any(quantity.driven == "reversal" for quantity in quantities):
+            subjects |= cls.LOST_MOTION
+        if any(quantity.name in LOADS_OF_ACTUATORS or quantity.driven in CARRYING for quantity in quantities):
+            subjects |= cls.ACTUATOR_LOADS
+        if rest_numbers(machine, names, limited=False):
+            subjects |= cls.REST
+        return subjects
+
+
+class _Effect(NamedTuple):
+    """The effect of a field.
+
+    Attributes:
+        subjects: the subjects on which it acts.
+        nonzero_for: subjects that ask for derivatives only where the value of the field is not 0: a link without mass
+            has no motion of its own, and a play that is not there loses none.
+    """
+
+    subjects: _Subject
+    nonzero_for: _Subject = _Subject(0)
+
+
+_WEIGHT_OF_PLATFORM = _Subject.INERTIA | _Subject.ACTUATOR_LOADS | _Subject.REST
+"""Subjects on which the platform acts by its weight. To first order actuators carry the platform, and no links."""
+_EFFECTS_BY_PATH = {
+    ("limits.", "bending_rigidity.", "cutting.", "cables."): _Effect(_Subject(0)),
+    ("load.min_tension", "load.max_tension"): _Effect(_Subject(0)),  # chosen tensions have no derivatives
+    ("load.",): _Effect(_Subject.ACTUATOR_LOADS | _Subject.REST),
+    ("expansion.", "temperature_rise."): _Effect(_Subject.REST),
+    ("damping.", "drives.rotor_damping"): _Effect(_Subject.LOST_MOTION, nonzero_for=_Subject.LOST_MOTION),
+    ("servo.",): _Effect(_Subject.LOST_MOTION | _Subject.INERTIA, nonzero_for=_Subject.LOST_MOTION),
+    ("drives.",): _Effect(_Subject.LOST_MOTION | _Subject.INERTIA, nonzero_for=_Subject.LOST_MOTION | _Subject.INERTIA),
+    ("tool.inertia", "tool.payload_inertia"): _Effect(_Subject.INERTIA),
+    ("tool.payload", "tool.centre_of_mass."): _Effect(_WEIGHT_OF_PLATFORM),
+    ("tool.mass",): _Effect(_WEIGHT_OF_PLATFORM | _Subject.MASS),
+}
+"""Effects of fields by the beginnings of their paths, of which the first that fits counts: single fields stand before
+their table. Fields that have none of these beginnings act by their kind, see `_effect_of`."""
 NO_STATE_NEARBY = (
     "Newton's method does not lead from the unloaded pose to a stable state of rest nearby, so that there are no "
     "derivatives here. Look at the loaded state (analyze --loaded), and reduce the loads."
@@ -66,7 +120,7 @@ MOST_NAMED = 12
 """Greatest number of parameters without influence that are named: two lines of a terminal."""
 
 UNIT_OF_PERCENTS = "percent per percent, for an angle per 0.01 rad"
-"""Unit of the percentages. A percent of an angle has no meaning, because the zero of an angle is a convention."""
+"""Unit of the percentages; see `Measure`."""
 
 BECAUSE_RIGID = "because rigid (a relative change is undefined)"
 """The reason why there is no derivative by an infinite stiffness."""
@@ -89,7 +143,7 @@ def relative_sensitivity(slope: Array | float, size: Array | float, index: Array
 
     Args:
         slope: derivative of the index by the parameter, SI.
-        size: the amount of which one percent is a percent of change of the parameter, SI; see `measure_of`.
+        size: the amount of which one percent is a percent of change of the parameter, SI; see `percent_base`.
         index: the index, SI.
     """
     with np.errstate(all="ignore"):
@@ -98,20 +152,37 @@ def relative_sensitivity(slope: Array | float, size: Array | float, index: Array
     return np.where(is_defined, ratio, math.nan)
 
 
-def measure_of(kind: str, value: float, length: float) -> tuple[float, str]:
-    """Return the amount of which one percent is a percent of change of a parameter, SI, and the name of that measure.
+class Measure(StrEnum):
+    """The amounts of which one percent may be a percent of change of a parameter."""
 
-    It is the parameter itself, except for a length of zero, where it is the characteristic length of the machine, and
-    for an angle, where it is 1 rad.
+    ITSELF = "itself"
+    """The value of the parameter."""
+    LENGTH = "length"
+    """The characteristic length of the machine, for a length of zero."""
+    RADIAN = "radian"
+    """1 rad, for an angle: the zero of an angle is a convention, so that a percent of its value has no meaning."""
+    AXIS = "axis"
+    """The length of a direction, for its components."""
+
+
+class PercentBase(NamedTuple):
+    """The amount of which one percent is a percent of change of a parameter, SI, and what it is."""
+
+    amount: float
+    measure: Measure
+
+
+def percent_base(kind: str, value: float, length: float) -> PercentBase:
+    """Return the amount of which one percent is a percent of change of a parameter, `Measure.AXIS` apart.
 
     Args:
-        kind: kind of the parameter, a key of `units.KINDS`; entries of a direction are measured by its length instead.
+        kind: kind of the parameter, a key of `units.KINDS`.
         value: value of the parameter, SI.
         length: characteristic length, m.
     """
     if kind == "length" and abs(value) <= ZERO_LENGTH * length:
-        return length, "length"
-    return (1.0, "radian") if kind == "angle" else (abs(value), "itself")
+        return PercentBase(length, Measure.LENGTH)
+    return PercentBase(1.0, Measure.RADIAN) if kind == "angle" else PercentBase(abs(value), Measure.ITSELF)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,19 +193,18 @@ class Influence(ImmutableAnswer):
         path: path of the parameter.
         kind: kind of the parameter, a key of `units.KINDS`.
         value: its value, SI.
-        percent_of: the amount of which one percent is a percent of change, SI: the value itself, or a `measure`.
-        measure: "itself", "length" where a length is zero (the machine's characteristic length), "radian" of an angle
-            (whose percent is 0.01 rad), or "axis" (the direction's length).
+        percent_of: the amount of which one percent is a percent of change, SI.
+        measure: what this amount is.
         derivatives: derivative of each index by it, SI; NaN where the index is infinite [indices].
-        percents: percent by which each index changes per percent of a change; NaN where the index is infinite, or 0 up
-            to round-off.
+        percents: percent by which each index changes per percent of a change; NaN where `relative_sensitivity` is not
+            defined [indices].
     """
 
     path: str
     kind: str
     value: float
     percent_of: float
-    measure: str
+    measure: Measure
     derivatives: Array
     percents: Array
 
@@ -215,8 +285,9 @@ def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("c
     response = state.response
     if state.status in (Status.JOINT_LIMIT, Status.NO_REST):
         return Sensitivity(machine, state.status, state.refusal, loads_left_out=uncounted)
-    numbers = values(machine)
-    candidates = [p for p in parameters(machine.family) if len(p.leaves) == 1 and _decides(machine, p, names, numbers)]
+    numbers, subjects = values(machine), _Subject.of(machine, names)
+    scalars = [p for p in parameters(machine.family) if len(p.leaves) == 1]
+    candidates = [p for p in scalars if _may_influence(p, numbers[p.path], subjects)]
     varied = [p.path for p in candidates if not math.isinf(numbers[p.path])]
     answer = evaluate_gradient(machine, point_of_file(machine), names, varied)
     status = Status(int(answer.status[0]))
@@ -226,7 +297,7 @@ def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("c
     pairs = zip(names, answer.values[:, 0].tolist(), strict=True)
     indices = np.array([_without_round_off(machine, name, value, response) for name, value in pairs])
     slopes = dict(zip(varied, answer.gradients[:, :, 0].T.tolist(), strict=True))
-    reasons = {p.path: _no_derivative(p, numbers, slopes) for p in candidates}
+    reasons = {p.path: _no_derivative(p, numbers[p.path], slopes.get(p.path, ())) for p in candidates}
     length = float(response.configuration.length)
     influences = [_influence(p, numbers, indices, slopes[p.path], length) for p in candidates if not reasons[p.path]]
     return Sensitivity(
@@ -245,70 +316,77 @@ def sensitivity(machine: Machine | MachineState, quantities: Sequence[str] = ("c
 
 def _without_round_off(machine: Machine, name: str, value: float, response: Response) -> float:
     """An index, set to zero where it is an entry of C or K that is only round-off: of a rigid or a free direction."""
-    about = QUANTITIES[name].components
-    if not about or not math.isfinite(value) or needs_state(machine, [name], limited=False):
+    components = QUANTITIES[name].components
+    if not components or not math.isfinite(value) or needs_state(machine, [name], limited=False):
         return value
-    matrix = response.compliance if name.startswith("compliance") else response.stiffness
-    shrink = 1.0 / float(response.configuration.length)
-    arms = [1.0] * 3 + [shrink] * 3 if matrix is response.compliance else [shrink] * 3 + [1.0] * 3
-    diagonal = [abs(float(entry)) * arm * arm for entry, arm in zip(matrix.diagonal(), arms, strict=True)]
+    is_compliance, length = name.startswith("compliance"), float(response.configuration.length)
+    matrix = response.compliance if is_compliance else response.stiffness
+    # With these factors all entries have the unit of the translational ones: rotations count at the machine's length.
+    rotation_factor = 1.0 / length
+    factors = [1.0] * 3 + [rotation_factor] * 3 if is_compliance else [rotation_factor] * 3 + [1.0] * 3
+    diagonal = [abs(float(entry)) * factor**2 for entry, factor in zip(matrix.diagonal(), factors, strict=True)]
     largest = max((size for size in diagonal if math.isfinite(size)), default=0.0)
-    first, last = (COMPONENTS.index(about[k]) for k in (0, -1))
-    present = min(diagonal[first], diagonal[last]) > ROUND_OFF_OF_ENTRY * ROUND_OFF_OF_ENTRY * largest
-    compared = math.sqrt(diagonal[first]) * math.sqrt(diagonal[last])
-    return value if present and abs(value) * arms[first] * arms[last] > ROUND_OFF_OF_ENTRY * compared else 0.0
+    row, column = COMPONENTS.index(components[0]), COMPONENTS.index(components[-1])
+    # An entry of the diagonal is the square of a motion, so that the share of the motion counts squared; another entry
+    # is at most the geometric mean of the two of the diagonal that it couples.
+    if min(diagonal[row], diagonal[column]) <= ROUND_OFF_OF_ENTRY**2 * largest:
+        return 0.0
+    coupled = math.sqrt(diagonal[row]) * math.sqrt(diagonal[column])
+    return value if abs(value) * factors[row] * factors[column] > ROUND_OFF_OF_ENTRY * coupled else 0.0
 
 
-def _decides(machine: Machine, parameter: Parameter, names: Sequence[str], here: Mapping[str, float]) -> bool:
-    """Whether any of the quantities may depend on a parameter."""
-    path, quantities = parameter.path, [QUANTITIES[name] for name in names]
-    inertial = any(quantity.modal for quantity in quantities) or needs_masses(names)
-    if path.startswith(FIELDS_OF_LOST_MOTION) and any(quantity.driven == "reversal" for quantity in quantities):
-        return here[path] != 0.0
-    if path.startswith(WITHOUT_DERIVATIVES) or (path.startswith(DYNAMIC_FIELDS) and not inertial):
-        return False
+def _may_influence(parameter: Parameter, value: float, subjects: _Subject) -> bool:
+    """Whether any quantity about the given subjects may depend on a parameter with a value, SI."""
+    effect = _effect_of(parameter)
+    return bool(effect.subjects & subjects) and not (value == 0.0 and effect.nonzero_for & subjects)
+
+
+def _effect_of(parameter: Parameter) -> _Effect:
+    """The effect of a parameter: that of its table, or of the masses of links and joints, or else on C and K."""
+    for beginnings, effect in _EFFECTS_BY_PATH.items():
+        if parameter.path.startswith(beginnings):
+            return effect
     if parameter.quantity.kind == "inertia":
-        return inertial
-    of_mass = KINDS[parameter.quantity.kind].heavy or path.startswith("drives.")
-    if inertial and of_mass and not path.startswith("tool."):
-        return here[path] != 0.0  # a link or rotor without mass has no motion of its own
-    if rest_numbers(machine, names, limited=False):
-        return not path.startswith(TENSION_BOUNDS)
-    driven = any(name in LOADS_OF_ACTUATORS or QUANTITIES[name].driven in CARRYING for name in names)
-    if driven and path.startswith(("load.", "tool.")):
-        return not path.startswith(TENSION_BOUNDS)  # to first order, actuators carry the loads and the platform
-    if ".centre_of_mass." in path or (inertial and path.startswith("tool.")):
-        return inertial
-    return not path.startswith(WITHOUT_INFLUENCE) and ("mass" in names or not of_mass)
+        return _Effect(_Subject.INERTIA)
+    if ".centre_of_mass." in parameter.path:
+        return _Effect(_Subject.INERTIA | _Subject.REST)
+    if KINDS[parameter.quantity.kind].heavy:
+        return _Effect(_Subject.MASS | _Subject.INERTIA | _Subject.REST, nonzero_for=_Subject.INERTIA)
+    return _Effect(_Subject.STIFFNESS)
 
 
-def _no_derivative(parameter: Parameter, here: dict[str, float], slopes: dict[str, list[float]]) -> str:
-    """Why there is no derivative by a parameter; empty if there is one."""
-    value = here[parameter.path]
+def _no_derivative(parameter: Parameter, value: float, slopes: Sequence[float]) -> str:
+    """Why there is no derivative by a parameter; empty if there is one.
+
+    Args:
+        parameter: the parameter.
+        value: its value, SI.
+        slopes: derivatives of all indices by it; none of a value that is infinite.
+    """
     if math.isinf(value):
         return BECAUSE_RIGID
     if parameter.quantity.stiff and value == 0.0:
         return BECAUSE_FREE
-    return BECAUSE_OPEN if all(math.isnan(slope) for slope in slopes[parameter.path]) else ""
+    return BECAUSE_OPEN if all(math.isnan(slope) for slope in slopes) else ""
 
 
 def _influence(
-    parameter: Parameter, here: dict[str, float], indices: Array, slopes: Sequence[float], length: float
+    parameter: Parameter, value_by_path: Mapping[str, float], indices: Array, slopes: Sequence[float], length: float
 ) -> Influence:
+    """The effect of a parameter on indices, by the derivatives of these, at a machine of some characteristic length."""
     path, kind = parameter.path, parameter.quantity.kind
+    base = percent_base(kind, value_by_path[path], length)
     if kind == "direction":
-        axis = path.rpartition(".")[0]
-        size, measure = math.hypot(*(here[f"{axis}.{i}"] for i in range(3))), "axis"
-    else:
-        size, measure = measure_of(kind, here[path], length)
+        direction = path.rpartition(".")[0]
+        base = PercentBase(math.hypot(*(value_by_path[f"{direction}.{i}"] for i in range(3))), Measure.AXIS)
     return Influence(
         path=path,
         kind=kind,
-        value=here[path],
-        percent_of=size,
-        measure=measure,
+        value=value_by_path[path],
+        percent_of=base.amount,
+        measure=base.measure,
         derivatives=np.array(slopes, dtype=float),
-        percents=relative_sensitivity(np.array(slopes), size, indices),
+        percents=relative_sensitivity(np.array(slopes), base.amount, indices),
     )
 
 
@@ -317,9 +395,9 @@ def notes(answer: Sensitivity) -> Iterator[str]:
     used = {parameter.measure for parameter in answer.parameters}
     length = answer.machine.display.show(answer.characteristic_length, "m")
     meanings = {
-        "length": f"for a length of 0, one percent is that of the characteristic length, {length}",
-        "radian": "for an angle of any value, one percent is 0.01 rad (0.57 deg)",
-        "axis": "for a component of a direction, one percent is that of the length of the direction",
+        Measure.LENGTH: f"for a length of 0, one percent is that of the characteristic length, {length}",
+        Measure.RADIAN: "for an angle of any value, one percent is 0.01 rad (0.57 deg)",
+        Measure.AXIS: "for a component of a direction, one percent is that of the length of the direction",
     }
     explained = [meaning for measure, meaning in meanings.items() if measure in used]
     yield "; ".join(["Percent of the result per percent of the parameter", *explained]) + "."
