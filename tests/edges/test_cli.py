@@ -65,6 +65,7 @@ REFUSED = [
     (["sweep", MACHINE, "--vary", "q=1:2:3"], ['"q" is not a field', "x, z, theta5"]),
     (["sweep", MACHINE, "--vary", "z=1:3"], ['"z=1:3" is not a range', "from:to:count"]),
     (["sweep", MACHINE, "--vary", "z=1:3:1"], ['count is "1"', "2 to"]),
+    (["sweep", MACHINE, "--vary", "z=1:3:000000041999999999"], ['count is "000000041999999999"', "2 to"]),
     (["sweep", MACHINE, "--vary", "z=-1:3:5:log"], ["z", "above 0", "-1.0 m"]),
     (["sweep", MACHINE, "--vary", "z=1 kg:2 kg:3"], ["z", '"1 kg"', "length"]),
     (["sweep", MACHINE, "--vary", "geometry.base_radius=-1:2:3"], ["base_radius", "greater than 0"]),

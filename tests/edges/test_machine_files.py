@@ -6,7 +6,8 @@ from machine_files import GOOD, HUGE_NUMBER, NAME, refusal
 from kinetostat.machine.loading import build, bundled, load
 from kinetostat.machine.parameters import values
 from kinetostat.spec import document
-from kinetostat.spec.errors import first_mistakes, shorten
+from kinetostat.spec.errors import choice, first_mistakes, shorten
+from refusals import refused
 
 LENGTH = ['e.g. "12 cm"', "bare number in m"]
 LINKS = '["68 cm", "68 cm"]'
@@ -236,3 +237,9 @@ def test_values_in_messages_are_short():
     assert shorten("12 cm") == '"12 cm"'
     assert shorten(3) == "3"
     assert len(shorten(list(range(1000)))) == 60
+
+
+def test_names_that_end_in_thousands_of_digits_are_listed():
+    """Python converts no number of so many digits, and to list known names it is asked for the next one."""
+    with refused("choose from a1"):
+        choice("q", ["a" + "1" * 5000, "b"], "the name")

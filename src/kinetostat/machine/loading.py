@@ -4,7 +4,6 @@ A file for people, which keeps comments and order, is written by `saving`.
 """
 
 import copy
-import difflib
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -28,9 +27,9 @@ from kinetostat.machine.parameters import POSE, Given, check_contrast, find_fiel
 from kinetostat.machine.series import family_with_parts, with_named_parts
 from kinetostat.machine.written.plan import CABLE, NAME, PLANAR_POSE, SPATIAL_POSE, SUMMARY, Plan
 from kinetostat.spec import document as documents
-from kinetostat.spec.arguments import checked
+from kinetostat.spec.arguments import as_list, checked
 from kinetostat.spec.document import Document
-from kinetostat.spec.errors import InputError, choice, several, shorten
+from kinetostat.spec.errors import InputError, choice, hint, shorten
 from kinetostat.spec.fields import optional, quantities
 from kinetostat.spec.immutable import FixedDict
 from kinetostat.spec.requirements import TABLE, requirement_lines, take_requirements, with_files
@@ -81,9 +80,8 @@ def load(machine: str | Path, settings: Sequence[str] = ()) -> Machine:
         return build(shipped[name], name, settings)
     path = Path(machine)
     if not documents.exists(path):
-        near = difflib.get_close_matches(name, shipped, 1)
-        hint = f'did you mean "{near[0]}"?' if near else f"bundled machines: {', '.join(shipped)}."
-        raise InputError(f"{shorten(name)} is neither a file nor a bundled machine; {hint}")
+        advice = hint(name, shipped, f"bundled machines: {', '.join(shipped)}.")
+        raise InputError(f"{shorten(name)} is neither a file nor a bundled machine; {advice}")
     loaded = build(documents.read_text(path), name, settings)
     if not loaded.requirements:
         return loaded
@@ -117,7 +115,7 @@ def build(document: str | Document, origin: str = "the machine", settings: Seque
 
 def _in_full(document: Document, settings: Sequence[str]) -> list[str]:
     """Write overrides with the whole path of their fields: "x=5 mm" as "pose.x=5 mm"."""
-    pairs = ((setting, *setting.partition("=")) for setting in several(settings))
+    pairs = ((setting, *setting.partition("=")) for setting in as_list(settings))
     return [
         f"{_whole_path(document, numbered_entry(name.strip()))}={value}" if sign and name.strip() else given
         for given, name, sign, value in pairs
@@ -278,9 +276,8 @@ def _family(name: object, origin: str) -> Family:
     known = [*families(), NAME]
     if name is None:
         raise InputError(f'"{origin}": family is missing; add family = "..." with one of: {", ".join(known)}.')
-    near = difflib.get_close_matches(str(name), known, 1)
-    hint = f'did you mean "{near[0]}"?' if near else f"known families: {', '.join(known)}."
-    raise InputError(f'"{origin}": family is {shorten(name)}, which is not known; {hint}')
+    advice = hint(str(name), known, f"known families: {', '.join(known)}.")
+    raise InputError(f'"{origin}": family is {shorten(name)}, which is not known; {advice}')
 
 
 def kinds_of_machine() -> dict[str, str]:

@@ -3,7 +3,6 @@
 Numbers that are hardly what was meant are pointed out here too (`doubts`); what is refused is up to `spec`.
 """
 
-import difflib
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -13,7 +12,7 @@ from typing import Any, Protocol, TypeVar
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.frozen import dataclass
 from kinetostat.machine.column import column
-from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.errors import InputError, nearest, shorten
 from kinetostat.spec.fields import Quantity, leaves, quantities
 from kinetostat.units import KINDS, RIGID, UnitError
 
@@ -209,11 +208,11 @@ def find_field(family: HasFields, text: str) -> Parameter:
         return known[ends[0]]
     if ends:
         raise InputError(f'"{text}" may mean {" or ".join(ends)}; write one of them.')
-    near = difflib.get_close_matches(text, [*known, *(path.split(".", 1)[1] for path in known)], 1)
+    near = nearest(text, [*known, *(path.split(".", 1)[1] for path in known)])
     pose = ", ".join(shown(path) for path in known if path.startswith(POSE))
     rest = f"coordinates of its pose are {pose}, and `kinetostat check` shows every field."
-    hint = f"did you mean {named_entry(near[0])}?" if near else rest
-    raise InputError(f"{shorten(as_written)} is not a field of family {family.name}; {hint}")
+    advice = f"did you mean {named_entry(near)}?" if near else rest
+    raise InputError(f"{shorten(as_written)} is not a field of family {family.name}; {advice}")
 
 
 def values(machine: HasNumbers) -> dict[str, Scalar]:

@@ -1,9 +1,9 @@
 """Arguments of public functions in Python: each is of the kind that its annotation says, or is refused.
 
-What an argument means, and whether its value is allowed, is the business of the function.
+Only kinds are compared here: whether a text names something, or a number is within its bounds, the function itself
+checks. The words below tell people what to give in place of something of another kind.
 """
 
-import difflib
 import inspect
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence, Set
 from functools import wraps
@@ -11,22 +11,22 @@ from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
 from types import UnionType
-from typing import Any, Literal, ParamSpec, TypeVar, Union, get_args, get_origin
+from typing import Any, Literal, NamedTuple, ParamSpec, TypeVar, Union, get_args, get_origin
 
-from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.errors import InputError, hint, shorten
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
-CLASSES = {
+WORDS_OF_CLASSES = {
     "Machine": "a machine, as load(...) and build(...) return one",
     "MachineState": "a machine in a state, as state_of(...) returns one",
     "Problem": "a problem, as load_problem(...) returns one",
     "Family": "a Family, as docs/extending.md shows",
     "bool": "True or False",
 }
-"""Words for an argument, by the name of the class in the annotation."""
-WORDS = {
+"""Words for an argument, by the name of the class in the annotation. They come before those by its own name."""
+WORDS_OF_NAMES = {
     "about": "a machine, or the result of a study",
     "acceleration": 'an acceleration, e.g. "5 m/s**2"',
     "actuators": 'a dictionary with a coordinate for each actuator, e.g. {"leg 1": "31 cm"}',
@@ -107,9 +107,9 @@ WORDS = {
     "wrenches": "a row of six numbers for each load: moment in N·m, force in N",
 }
 """Words for an argument, by its name in alphabetical order; a name means the same in every function."""
-ACCEPTED: Mapping[type, tuple[type, ...]] = {Path: (str, PathLike), int: (Integral,), float: (Real,)}
-"""Classes that stand for the one that an annotation names."""
-FREE = (Any, object, inspect.Parameter.empty)
+STAND_INS: Mapping[type, tuple[type, ...]] = {Path: (str, PathLike), int: (Integral,), float: (Real,)}
+"""Classes whose objects are taken where an annotation names the first one."""
+UNCHECKED = (Any, object, inspect.Parameter.empty)
 """Annotations that allow anything."""
 
 
@@ -137,14 +137,19 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     return call
 
 
+def as_list(texts: str | Iterable[str]) -> list[str]:
+    """Return texts as a list; one text alone stands for a list of it."""
+    return [texts] if isinstance(texts, str) else list(texts)
+
+
 def _unbound(name: str, signature: inspect.Signature, named: Mapping[str, Any], reason: str) -> str:
     """Say which argument is unknown or missing, and what there is."""
     arguments = [argument for argument in signature.parameters if argument != "self"]
     takes = f"{name} takes {', '.join(arguments) or 'no argument'}."
-    for unknown in (argument for argument in named if argument not in arguments):
-        near = difflib.get_close_matches(unknown, arguments, 1)
-        return f"{name} has no argument {unknown}; " + (f"did you mean {near[0]}?" if near else takes)
-    return f"{name}: {reason}; {takes}"
+    unknown = next((argument for argument in named if argument not in arguments), None)
+    if unknown is None:
+        return f"{name}: {reason}; {takes}"
+    return f"{name} has no argument {unknown}; {hint(unknown, arguments, takes, quoted=False)}"
 
 
 def _read_argument(value: Any, parameter: inspect.Parameter) -> Any:
@@ -154,26 +159,25 @@ def _read_argument(value: Any, parameter: inspect.Parameter) -> Any:
         InputError: it is not of the kind that the annotation says.
     """
     kind, name = parameter.annotation, parameter.name
-    if any(_is_list(part) for part in _parts(kind)):
-        value = _as_list(value)
+    if any(_is_of_lists(part) for part in _alternatives(kind)):
+        value = _entries_read(value)
     misfit = _misfit(value, kind, name)
     if misfit is not None:
-        place, wrong = misfit
         optional = ", or leave it out" if value is None and parameter.default is not parameter.empty else ""
-        raise InputError(f"{place} is {shorten(wrong)}; give {words_of(parameter)}{optional}.")
-    return _plain(value)
+        raise InputError(f"{misfit.place} is {shorten(misfit.value)}; give {words_of(parameter)}{optional}.")
+    return _number_of_python(value)
 
 
-def _as_list(value: Any) -> Any:
-    """Return a generator or an array as a list, lists with plain numbers, and all else as it is."""
+def _entries_read(value: Any) -> Any:
+    """Return a generator or an array as a list, lists and tuples with Python's numbers, and all else as it is."""
     if isinstance(value, tuple):
-        return tuple(map(_plain, value))
-    array = hasattr(value, "__array__") and not isinstance(value, Mapping) and getattr(value, "ndim", 0) > 0
-    return [_plain(entry) for entry in value] if array or isinstance(value, Iterator | list) else value
+        return tuple(map(_number_of_python, value))
+    is_array = hasattr(value, "__array__") and not isinstance(value, Mapping) and getattr(value, "ndim", 0) > 0
+    return [_number_of_python(entry) for entry in value] if is_array or isinstance(value, Iterator | list) else value
 
 
-def _plain(value: Any) -> Any:
-    """Return a number of another library as one of Python's: those of eight bits overflow at 127."""
+def _number_of_python(value: Any) -> Any:
+    """Return a number of another library as one of Python's, because those of eight bits overflow at 127."""
     if isinstance(value, bool) or type(value) in (int, float):
         return value
     return int(value) if isinstance(value, Integral) else float(value) if isinstance(value, Real) else value
@@ -181,38 +185,43 @@ def _plain(value: Any) -> Any:
 
 def words_of(parameter: inspect.Parameter) -> str:
     """Return what to give for a parameter of a public function."""
-    names = (getattr(part, "__name__", "") for part in _parts(parameter.annotation))
-    return next((CLASSES[name] for name in names if name in CLASSES), "") or WORDS[parameter.name]
+    names = (getattr(part, "__name__", "") for part in _alternatives(parameter.annotation))
+    of_class = next((WORDS_OF_CLASSES[name] for name in names if name in WORDS_OF_CLASSES), "")
+    return of_class or WORDS_OF_NAMES[parameter.name]
 
 
-Misfit = tuple[str, object] | None
-"""Place of something that is not of its kind, and what stands there."""
+class Misfit(NamedTuple):
+    """Something that is not of its kind: the place of it, such as "over[2]", and what stands there."""
+
+    place: str
+    value: object
 
 
-def _misfit(value: Any, kind: Any, name: str) -> Misfit:
+def _misfit(value: Any, kind: Any, name: str) -> Misfit | None:
     """Return the first entry that does not fit a kind, or the whole if it is not a list; None if all fits."""
-    parts = _parts(kind)
-    misfits = [_misfit_of(value, part, name) for part in parts]
-    if None in misfits:
-        return None
-    inner = [misfit for misfit in misfits if misfit is not None and misfit[0] != name]
-    return inner[0] if inner else (name, value)
+    misfits = []
+    for alternative in _alternatives(kind):
+        misfit = _misfit_of_one(value, alternative, name)
+        if misfit is None:
+            return None
+        misfits.append(misfit)
+    return next((misfit for misfit in misfits if misfit.place != name), Misfit(name, value))
 
 
-def _misfit_of(value: Any, kind: Any, name: str) -> Misfit:
-    """Return what is not of a kind without alternatives."""
+def _misfit_of_one(value: Any, kind: Any, name: str) -> Misfit | None:
+    """Return what is not of a kind that has no alternatives."""
     origin, inside = get_origin(kind), get_args(kind)
-    misfit = name, value
-    if kind in FREE or isinstance(kind, str | TypeVar) or origin is Literal:
+    misfit = Misfit(name, value)
+    if kind in UNCHECKED or isinstance(kind, str | TypeVar) or origin is Literal:
         return None
     if origin is Callable:
         return None if callable(value) else misfit
-    if _is_list(kind):
-        if isinstance(value, str) and str in _parts(inside[0]):
+    if _is_of_lists(kind):
+        if isinstance(value, str) and str in _alternatives(inside[0]):
             return None  # a text alone stands for a list of it
         if not _is_row(value, len(inside) if origin is tuple else None, origin is Collection):
             return misfit
-        if float in _parts(inside[0]) and all(type(entry) is float for entry in value):
+        if float in _alternatives(inside[0]) and all(type(entry) is float for entry in value):
             return None  # thousands of numbers are not looked at one by one
         return _first(_misfit(entry, inside[0], f"{name}[{place}]") for place, entry in enumerate(value))
     if origin is not None:
@@ -222,15 +231,21 @@ def _misfit_of(value: Any, kind: Any, name: str) -> Misfit:
         return _first(keys) or _first(_misfit(entry, inside[1], f"{name}[{key!r}]") for key, entry in value.items())
     if kind is not bool and isinstance(value, bool):
         return misfit
-    return None if isinstance(value, ACCEPTED.get(kind, kind)) else misfit
+    return None if isinstance(value, STAND_INS.get(kind, kind)) else misfit
 
 
-def _first(misfits: Iterable[Misfit]) -> Misfit:
+def _first(misfits: Iterable[Misfit | None]) -> Misfit | None:
     return next((misfit for misfit in misfits if misfit is not None), None)
 
 
 def _is_row(value: object, count: int | None, any_order: bool) -> bool:
-    """Return whether a value has entries in an order, and so many of them if a count is given."""
+    """Return whether a value has entries in an order, and so many of them if a count is given.
+
+    Args:
+        value: the argument.
+        count: number of entries that it must have; None for any number.
+        any_order: whether sets, which have no order, are taken as well.
+    """
     if not isinstance(value, Iterable) or isinstance(value, str | bytes | Mapping):
         return False
     if getattr(value, "shape", None) == ():  # an array of no dimension says that it can be iterated, and cannot
@@ -238,10 +253,11 @@ def _is_row(value: object, count: int | None, any_order: bool) -> bool:
     return (any_order or not isinstance(value, Set)) and (count is None or len(list(value)) == count)
 
 
-def _parts(kind: Any) -> tuple[Any, ...]:
+def _alternatives(kind: Any) -> tuple[Any, ...]:
     """Return the alternatives of an annotation."""
     return get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
 
 
-def _is_list(kind: Any) -> bool:
+def _is_of_lists(kind: Any) -> bool:
+    """Return whether an annotation asks for a row of entries."""
     return get_origin(kind) in (Sequence, Collection, Iterable, tuple)

@@ -2,7 +2,7 @@
 
 What a document means is decided in `spec.validation`. A parser's time and memory can grow faster than its text: a key
 of n parts takes Python's n^2 steps and as much memory, so 100 kB of `a.a.a...` would stop a server. So one pass over
-the text, in linear time, counts what matters before it is parsed; it knows strings and comments nothing else.
+the text, in linear time, counts keys, values and brackets before it is parsed; it passes over strings and comments.
 """
 
 import copy
@@ -13,17 +13,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from kinetostat.spec.errors import InputError, several, shorten
+from kinetostat.spec.arguments import as_list
+from kinetostat.spec.errors import InputError, shorten
 
 LARGEST_FILE = 1 << 20
-"""Largest file that is read, bytes. A machine file has a few hundred; a megabyte is a mistake or an attack."""
-
+"""Largest file that is read, bytes. A machine file has some thousand; a megabyte is a mistake or an attack."""
 DEEPEST = 8
 """Most levels of nested tables and lists, and most parts of a key; a machine file has three or four."""
 MOST_ENTRIES = 30_000
 """Most keys, parts of keys, values of lists and brackets together; machines of forty legs have some thousand."""
+LONGEST_COUNT = 9
+"""Digits of a number that counts: more than any count needs here. Python refuses to convert thousands of digits."""
 
-_TOKEN = re.compile(
+_TOKEN = re.compile(  # strings in four kinds of quotes, a comment, or one of the signs that are counted
     r'"""(?:[^"\\]|\\.|"(?!""))*+(?:"{3,5}|\Z)'  # an open string reaches to the end, where the parser refuses it
     r"|'''(?:[^']|'(?!''))*+(?:'{3,5}|\Z)"
     r'|"(?:[^"\\\n]|\\.)*+"?'
@@ -34,6 +36,7 @@ _TOKEN = re.compile(
 )
 
 Document = dict[str, Any]
+"""A TOML document: its tables, lists and values by key."""
 
 
 def is_study(document: Document) -> bool:
@@ -104,7 +107,7 @@ def parse(text: str, origin: str) -> Document:
         document = tomllib.loads(text)
     except ValueError as error:
         raise InputError(f'"{origin}" is not valid TOML: {error}. Text values need quotes, e.g. x = "2 cm".') from None
-    if _deeper_than(document, DEEPEST):
+    if _is_deeper_than(document, DEEPEST):
         raise InputError(f'"{origin}" is nested too deeply; it should have tables of values and lists.')
     return document
 
@@ -152,7 +155,7 @@ def check_bounds(text: str, origin: str) -> None:
             )
 
 
-def _deeper_than(document: Any, levels: int) -> bool:
+def _is_deeper_than(document: Any, levels: int) -> bool:
     """Tell whether tables and lists are nested in more than so many levels."""
     level = [document]
     for _ in range(levels):
@@ -169,26 +172,29 @@ def override(document: Document, settings: Sequence[str], counts: Mapping[str, i
     Args:
         document: the document as it was read.
         settings: the overrides, in order; a single one may be given without a list.
-        counts: number of entries of each field that is a list. If the document has a single value for all entries and
-            an override changes one entry, the value is first written out for each entry.
+        counts: number of entries of each field, by path, for which one value may stand. If the document has a single
+            value for all entries and an override changes one entry, the value is first written out for each entry.
 
     Raises:
         InputError: if a setting has no "=", an empty path, or a path through something that is not a table or list.
     """
     result = copy.deepcopy(document)
-    for setting in several(settings):
+    for setting in as_list(settings):
         path, equals, text = setting.partition("=")
         if not equals or not path.strip():
             raise InputError(f'--set {shorten(setting)} must be path=value, e.g. --set geometry.base_radius="26 cm".')
         if path.count(".") >= DEEPEST:
             raise InputError(f"--set {shorten(path)} has more than {DEEPEST} parts; no field is nested so deeply.")
-        _repeat(result, path.strip(), counts)
+        _repeat_for_entries(result, path.strip(), counts)
         _put(result, path.strip(), setting_value(text.strip()))
     return result
 
 
-def _repeat(document: Document, path: str, counts: Mapping[str, int]) -> None:
-    """Write a single value out for every entry of a list if `path` names an entry, such as `stiffness.legs.2`."""
+def _repeat_for_entries(document: Document, path: str, counts: Mapping[str, int]) -> None:
+    """Write a single value out for each entry of its field if `path` names an entry, such as `stiffness.legs.2`.
+
+    The document is changed; for all other paths it stays as it is.
+    """
     field, _, entry = path.rpartition(".")
     *tables, name = field.split(".")
     table: Any = document
@@ -226,6 +232,7 @@ def _put(document: Document, path: str, value: object) -> None:
 
 
 def _child(parent: Any, key: str, path: str) -> Any:
+    """Return what stands in a table or list under a key; a table that has no such key gets an empty table there."""
     if isinstance(parent, dict):
         return parent.setdefault(key, {})
     if isinstance(parent, list):
@@ -235,9 +242,13 @@ def _child(parent: Any, key: str, path: str) -> Any:
     )
 
 
+def is_whole_number(text: str) -> bool:
+    """Whether a text is a whole number from 0 with at most `LONGEST_COUNT` digits."""
+    return text.isdecimal() and len(text) <= LONGEST_COUNT
+
+
 def _index(entries: list[Any], key: str, path: str) -> int:
-    # Nine digits are more than any list has entries; Python refuses to convert thousands of digits.
-    if not key.isdecimal() or len(key) > 9 or int(key) >= len(entries):
+    if not is_whole_number(key) or int(key) >= len(entries):
         known = f"the list has entries 0 to {len(entries) - 1}"
         raise InputError(f"--set {shorten(path)}: {shorten(key)} is not an entry; {known}.")
     return int(key)

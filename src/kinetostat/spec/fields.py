@@ -17,8 +17,11 @@ import numpy as np
 
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
+from kinetostat.spec.document import is_whole_number
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.units import KINDS, RIGID, UnitError, parse, write, written_value
+
+Table = TypeVar("Table")
 
 LARGEST_OF_KIND = {"length": 1e6, "angle": 1e3}
 """Bounds on size, in SI: far beyond any machine, well inside float64."""
@@ -31,8 +34,6 @@ LEAST_STIFFNESS = 1e-12
 
 NO_LIMIT = "none"
 """The word for a limit that is not set."""
-
-Table = TypeVar("Table")
 
 
 @dataclass_transform(frozen_default=True)
@@ -50,13 +51,13 @@ class Quantity:
     Attributes:
         kind: a key of `units.KINDS`.
         meaning: one phrase for people, also the comment in templates.
-        positive: zero and negative values are refused; stiffness may be zero (free) but never negative.
-        count: the number of values.
-        per_leg: whether there is a value for each actuated leg, in their order.
-        apart: whether each of them must be written, as components and angles; otherwise one may stand for all.
+        positive: whether zero is refused, and negative values with it; a stiffness may be zero (free), never negative.
+        count: the number of values; None for a single one.
+        apart: whether each of several values must be written, as components and angles; else one may stand for all.
         most: the largest value that is allowed, SI.
-        least: the least size allowed for a value that is not 0, SI; 0 for the least size of the kind.
+        least: the least size allowed for a value that is not 0, SI; 0 for that of the kind, see `least_size`.
         unset: the infinity that stands for "no limit"; None for a quantity that is not a limit.
+        per_leg: whether there is a value for each actuated leg, in their order.
     """
 
     kind: str
@@ -73,6 +74,15 @@ class Quantity:
     def stiff(self) -> bool:
         """Whether it is a stiffness or a rigidity: from 0 (free) to "rigid"."""
         return KINDS[self.kind].stiff
+
+    @property
+    def least_size(self) -> float:
+        """Least size of a value that is not 0, SI; 0.0 where any is allowed."""
+        if self.least:
+            return self.least
+        if self.stiff:
+            return LEAST_STIFFNESS
+        return LEAST_OF_KIND.get(self.kind, 0.0) if self.positive else 0.0
 
     @property
     def entries(self) -> str:
@@ -138,11 +148,9 @@ class Quantity:
         if number > self.most:
             most = f"{math.degrees(self.most):g} deg" if self.kind == "angle" else f"{self.most:g} {kind.unit}"
             raise UnitError(f"it must not exceed {most}, {example}")
-        of_kind = LEAST_OF_KIND.get(self.kind, 0.0) if self.positive else 0.0
-        least = self.least or (LEAST_STIFFNESS if self.stiff else of_kind)
-        if 0.0 < abs(number) < least:
-            softest = f"; write 0 for a free element, or {example}" if self.stiff else f", {example}"
-            raise UnitError(f"it must be at least {least:g} {kind.unit}, and nothing is below that{softest}")
+        if 0.0 < abs(number) < self.least_size:
+            advice = f"; write 0 for a free element, or {example}" if self.stiff else f", {example}"
+            raise UnitError(f"it must be at least {self.least_size:g} {kind.unit}, and nothing is below that{advice}")
         largest = LARGEST_OF_KIND.get(self.kind, LARGEST_OTHER)
         if abs(number) > largest and not math.isinf(number):
             advice = f'; write "{RIGID}"' if self.stiff else ""
@@ -159,8 +167,8 @@ class Quantity:
     def __get_pydantic_json_schema__(self, _core: Any, _handler: Any) -> dict[str, Any]:
         """Return the JSON Schema of what may be written; pydantic asks for it in `machine.file_schema`."""
         kind = KINDS[self.kind]
-        table = ["object"] if self.stiff else []
-        single = {"type": ["number", "string", *table], "examples": [kind.example]}
+        cross_section = ["object"] if self.stiff else []
+        single = {"type": ["number", "string", *cross_section], "examples": [kind.example]}
         rule = f"{self.meaning}; a {kind.name} with its unit, or a bare number in {kind.unit}"
         rule += f', or "{RIGID}"' if self.stiff else ""
         rule += f', or "{NO_LIMIT}"' if self.unset is not None else ""
@@ -169,12 +177,12 @@ class Quantity:
         many = {"type": "array", "items": single, "minItems": self.count, "maxItems": self.count}
         if self.apart:
             return {**many, "description": f"{rule}; a list of {self.count}"}
-        part = {"type": "string", "pattern": r"^\s*[A-Za-z].*\s"}
-        row = [{"type": "array", "items": part, "minItems": 1}] if kind.name.endswith("stiffness") else []
-        return {"anyOf": [single, many, *row], "description": f"{rule}; one for all, or a list of {self.count}"}
+        named_part = {"type": "string", "pattern": r"^\s*[A-Za-z].*\s"}
+        series = [{"type": "array", "items": named_part, "minItems": 1}] if kind.name.endswith("stiffness") else []
+        return {"anyOf": [single, many, *series], "description": f"{rule}; one for all, or a list of {self.count}"}
 
 
-def positive(value: object, kind: str, name: str) -> float:
+def positive_number(value: object, kind: str, name: str) -> float:
     """Read an argument or an option that must be greater than 0, and of a size that can be computed with.
 
     Args:
@@ -236,8 +244,8 @@ def leaves(name: str, quantity: Quantity) -> Iterator[str]:
 
 MOST_VALUES = 1_000_000
 """Values along one axis: a mistyped count is refused before memory runs out."""
-
 RANGE_FORM = 'write FIELD=from:to:count or FIELD=from:to:count:log, e.g. pose.x="-2 cm:2 cm:41"'
+"""End of the message on what is not a range."""
 
 
 @dataclass(frozen=True)
@@ -297,7 +305,7 @@ def parse_range(text: str) -> Range:
     logarithmic = len(parts) == 4 and parts[3] == "log"
     if not equals or not field.strip() or len(parts) - logarithmic != 3:
         raise InputError(f"{shorten(text)} is not a range; {RANGE_FORM}.")
-    count = parts[2]
-    if not count.isdecimal() or not 2 <= int(count[:9]) <= MOST_VALUES:
+    start, end, count, *_ = parts
+    if not is_whole_number(count) or not 2 <= int(count) <= MOST_VALUES:
         raise InputError(f"{shorten(text)}: the count is {shorten(count)}; it must be 2 to {MOST_VALUES}.")
-    return Range(field.strip(), parts[0], parts[1], int(count), logarithmic)
+    return Range(field.strip(), start, end, int(count), logarithmic)

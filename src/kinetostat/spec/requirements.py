@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from kinetostat.frozen import dataclass
+from kinetostat.spec.arguments import as_list
 from kinetostat.spec.document import Document, override, read_text, toml_key, toml_value
-from kinetostat.spec.errors import InputError, several, shorten
+from kinetostat.spec.errors import InputError, shorten
 
 TABLE = "requirements"
 MOST_POSES = 10_000
@@ -79,8 +80,8 @@ def take_requirements(
     Raises:
         InputError: names the requirement that is not one, and how to write it.
     """
-    overrides = [text for text in several(settings) if text.partition("=")[0].strip().split(".")[0] == TABLE]
-    others = [text for text in several(settings) if text not in overrides]
+    overrides = [text for text in as_list(settings) if text.partition("=")[0].strip().split(".")[0] == TABLE]
+    others = [text for text in as_list(settings) if text not in overrides]
     written = override({TABLE: document.get(TABLE, {})}, overrides, {})[TABLE]
     return {key: value for key, value in document.items() if key != TABLE}, others, read_requirements(written, origin)
 
@@ -127,7 +128,7 @@ def _requirement_of(
 ) -> Requirement:
     """Make a requirement of what was written; numbers of poses are SI, and all else of them is text."""
     listed = [{key: value if isinstance(value, str) else float(value) for key, value in pose.items()} for pose in poses]
-    return Requirement(several(demand), list(over), listed, **driven)
+    return Requirement(as_list(demand), list(over), listed, **driven)
 
 
 def with_files(requirements: Requirements, folder: Path) -> Requirements:

@@ -4,14 +4,13 @@ Nothing is looked up or solved: which fields and quantities exist depends on the
 problem is built.
 """
 
-import difflib
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, WithJsonSchema
 
 from kinetostat.spec.document import Document, override, toml_pairs
-from kinetostat.spec.errors import PRINTABLE, InputError, cut, first_mistakes, shorten
+from kinetostat.spec.errors import PRINTABLE, InputError, cut, first_mistakes, hint, shorten
 from kinetostat.spec.requirements import TABLE, Requirements, read_requirements, requirement_lines, requirements_schema
 
 MOST_POPULATION = 100_000
@@ -195,8 +194,8 @@ def _sentence(mistake: dict[str, Any], document: Document) -> str:
         return f"{name} is missing ({_field(path)}); `kinetostat new study` prints a complete file."
     if mistake["type"] == "extra_forbidden":
         keys = _keys_at(path[:-1])
-        near = difflib.get_close_matches(path[-1], keys, 1)
-        return f"{name} is not known; " + (f"did you mean {near[0]}?" if near else f"it may be {', '.join(keys)}.")
+        advice = hint(path[-1], keys, f"it may be {', '.join(keys)}.", quoted=False)
+        return f"{name} is not known; {advice}"
     if mistake["type"] in ("model_type", "model_attributes_type"):
         return f"{name} is {shorten(value)}; it must be a table with the keys {', '.join(_keys_at(path))}."
     if mistake["type"] == "string_pattern_mismatch":

@@ -12,8 +12,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from kinetostat.frozen import dataclass
+from kinetostat.spec.arguments import as_list
 from kinetostat.spec.document import Document, setting_value, toml_key, toml_value
-from kinetostat.spec.errors import PRINTABLE, InputError, several, shorten
+from kinetostat.spec.errors import PRINTABLE, InputError, shorten
 from kinetostat.units import UnitError, parse
 
 MM, UM, MINUTE = 1e-3, 1e-6, math.pi / 180.0 / 60.0
@@ -227,8 +228,8 @@ def take_tolerances(document: Document, settings: Sequence[str], origin: str) ->
     Raises:
         InputError: names the line, its value, what is allowed, and how to write it.
     """
-    overrides = [text for text in several(settings) if re.match(rf"\s*{TABLE}\s*[.=]", text)]
-    others = [text for text in several(settings) if text not in overrides]
+    overrides = [text for text in as_list(settings) if re.match(rf"\s*{TABLE}\s*[.=]", text)]
+    others = [text for text in as_list(settings) if text not in overrides]
     tolerances = read_tolerances(document.get(TABLE, {}), f'"{origin}": ')
     for setting in overrides:
         path, equals, value = setting.partition("=")

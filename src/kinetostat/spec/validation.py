@@ -3,15 +3,15 @@
 The tables are the family's own dataclasses; the JSON Schema of the same tables is made in `machine.file_schema`.
 """
 
-import difflib
 import re
 from collections.abc import Iterator, Mapping
+from enum import Enum, auto
 from typing import Any
 
 from kinetostat.display import DIGITS, EXAMPLE, SI
 from kinetostat.frozen import dataclass
 from kinetostat.spec.document import Document
-from kinetostat.spec.errors import PRINTABLE, InputError, cut, first_mistakes, shorten
+from kinetostat.spec.errors import PRINTABLE, InputError, cut, first_mistakes, hint, shorten
 from kinetostat.spec.fields import Quantity, optional, quantities
 from kinetostat.units import KINDS, UnitError
 
@@ -36,17 +36,26 @@ DISPLAY_SCHEMA: dict[str, Any] = {
 """The schema of the table [display], which `display.read_display` reads."""
 
 
+class MistakeKind(Enum):
+    """Kind of a mistake, which decides its sentence."""
+
+    MISSING = auto()
+    UNKNOWN = auto()
+    NO_TABLE = auto()
+    WRONG_VALUE = auto()
+
+
 @dataclass(frozen=True)
 class Mistake:
     """Something in a document that its tables do not have, or do not allow.
 
     Attributes:
-        kind: "missing", "unknown", "no table" or "wrong".
+        kind: what is wrong about it.
         place: the keys that lead to it.
-        reason: the reason why it is wrong, where there is one to tell; else empty.
+        reason: the reason why a value is wrong, where there is one to tell; else empty.
     """
 
-    kind: str
+    kind: MistakeKind
     place: tuple[object, ...]
     reason: str = ""
 
@@ -69,7 +78,8 @@ def validated_tables(
         InputError: one sentence for each mistake, at most five.
     """
     reader = _TableReader(tables)
-    mistakes = [*_mistakes_in_head(document, family), *reader.read(document)]
+    reader.read(document)
+    mistakes = [*_mistakes_in_head(document, family), *reader.mistakes]
     if mistakes:
         sentences = first_mistakes(mistakes, lambda mistake: _sentence(mistake, document, reader))
         raise InputError(f'"{origin}": {sentences}')
@@ -80,56 +90,52 @@ def _mistakes_in_head(document: Document, family: str) -> Iterator[Mistake]:
     """Check the version of the format, the name of the machine and its family."""
     version, name = document.get("schema", SCHEMA_VERSION), document.get("name")
     if version != SCHEMA_VERSION:
-        yield Mistake("wrong", ("schema",))
+        yield Mistake(MistakeKind.WRONG_VALUE, ("schema",))
     if "name" not in document:
-        yield Mistake("missing", ("name",))
+        yield Mistake(MistakeKind.MISSING, ("name",))
     elif not (isinstance(name, str) and 0 < len(name) <= LONGEST_MACHINE_NAME and re.fullmatch(PRINTABLE, name)):
-        yield Mistake("wrong", ("name",))
+        yield Mistake(MistakeKind.WRONG_VALUE, ("name",))
     if document.get("family") != family:
-        yield Mistake("wrong", ("family",), f'an override cannot change it from "{family}"; start from another machine')
+        reason = f'an override cannot change it from "{family}"; start from another machine'
+        yield Mistake(MistakeKind.WRONG_VALUE, ("family",), reason)
 
 
 class _TableReader:
-    """Reads a document into instances of tables.
+    """Reads a document into instances of tables, and collects the mistakes in it.
 
     Attributes:
         tables: classes of the tables, by dotted name.
         subtables: names of the tables that each table holds, by its dotted name, in their order.
-        instances: the tables that have been read.
+        instances: the tables that have been read, by dotted name.
+        mistakes: the mistakes that have been met, in the order of fields.
     """
 
     def __init__(self, tables: Mapping[str, type]) -> None:
         self.tables = tables
         self.subtables: dict[str, dict[str, None]] = {}
         self.instances: dict[str, Any] = {}
+        self.mistakes: list[Mistake] = []
         for path in tables:
             names = path.split(".")
             for depth, name in enumerate(names):
                 self.subtables.setdefault(".".join(names[:depth]), {})[name] = None
 
-    def read(self, content: object, place: tuple[str, ...] = ()) -> Iterator[Mistake]:
-        """Read the content of a table and of the tables in it; mistakes come in the order of fields.
-
-        A table in which all may be left out may be left out itself, unless it holds others.
-        """
+    def read(self, content: object, place: tuple[str, ...] = ()) -> None:
+        """Read the content of the table at a place of the document, and of the tables in it."""
         path = ".".join(place)
         table, subtables = self.tables.get(path), self.subtables.get(path, {})
         if not isinstance(content, dict):
-            yield Mistake("no table", place)
+            self.mistakes.append(Mistake(MistakeKind.NO_TABLE, place))
             return
-        fields = quantities(table) if table else {}
         if table:
-            yield from self._read_fields(content, place, table)
+            self._read_fields(content, place, table)
         for name in subtables:
-            if name in content:
-                yield from self.read(content[name], (*place, name))
-            elif not self._may_miss(".".join([*place, name])):
-                yield Mistake("missing", (*place, name))
-        for key in content:
-            if key not in fields and key not in subtables and (place or key not in HEAD):
-                yield Mistake("unknown", (*place, key))
+            self._read_subtable(content, (*place, name))
+        fields = quantities(table) if table else {}
+        unknown = [key for key in content if key not in fields and key not in subtables and (place or key not in HEAD)]
+        self.mistakes += [Mistake(MistakeKind.UNKNOWN, (*place, key)) for key in unknown]
 
-    def _read_fields(self, content: Document, place: tuple[str, ...], table: type) -> Iterator[Mistake]:
+    def _read_fields(self, content: Document, place: tuple[str, ...], table: type) -> None:
         """Read the fields of a table; it is made if all of them can be read."""
         values = {}
         for name, quantity in quantities(table).items():
@@ -137,19 +143,22 @@ class _TableReader:
                 try:
                     values[name] = quantity.read(content[name])
                 except UnitError as error:
-                    yield Mistake("wrong", (*place, name), str(error))
+                    self.mistakes.append(Mistake(MistakeKind.WRONG_VALUE, (*place, name), str(error)))
             elif name not in optional(table):
-                yield Mistake("missing", (*place, name))
+                self.mistakes.append(Mistake(MistakeKind.MISSING, (*place, name)))
         if {*quantities(table)} - optional(table) <= values.keys():
             self.instances[".".join(place)] = table(**values)
 
-    def _may_miss(self, path: str) -> bool:
-        """Return whether a table may be left out; it is then as if it were empty."""
+    def _read_subtable(self, content: Document, place: tuple[str, ...]) -> None:
+        """Read a table in another one. It may be left out if all its fields may, unless it holds tables itself."""
+        path = ".".join(place)
         table = self.tables.get(path)
-        may_miss = table is not None and path not in self.subtables and optional(table) == set(quantities(table))
-        if table and may_miss:
+        if place[-1] in content:
+            self.read(content[place[-1]], place)
+        elif table is not None and path not in self.subtables and optional(table) == {*quantities(table)}:
             self.instances[path] = table()
-        return may_miss
+        else:
+            self.mistakes.append(Mistake(MistakeKind.MISSING, place))
 
 
 def _sentence(mistake: Mistake, document: Document, reader: _TableReader) -> str:
@@ -158,15 +167,14 @@ def _sentence(mistake: Mistake, document: Document, reader: _TableReader) -> str
     name, last = ".".join(cut(part) for part in path), cut(path[-1])
     parent = ".".join(path[:-1])
     fields = quantities(reader.tables[parent]) if parent in reader.tables else {}
-    if mistake.kind == "missing":
+    if mistake.kind is MistakeKind.MISSING:
         return _missing(parent, name, last, fields, document.get("family"))
-    if mistake.kind == "unknown":
+    if mistake.kind is MistakeKind.UNKNOWN:
         allowed = list(fields) or [*([] if parent else HEAD), *reader.subtables.get(parent, ())]
-        close = difflib.get_close_matches(last, allowed, 1)
-        hint = f"did you mean {close[0]}?" if close else f"it may hold {', '.join(allowed)}."
-        return f"{name} is not known; {hint}"
+        advice = hint(last, allowed, f"it may hold {', '.join(allowed)}.", quoted=False)
+        return f"{name} is not known; {advice}"
     value = shorten(_look_up(document, path))
-    if mistake.kind == "no table":
+    if mistake.kind is MistakeKind.NO_TABLE:
         return f"{name} is {value}; it must be a table, written as [{name}] with one line for each value."
     if name == "schema":
         return f"schema is {value}; this version reads schema = {SCHEMA_VERSION}."
@@ -177,7 +185,15 @@ def _sentence(mistake: Mistake, document: Document, reader: _TableReader) -> str
 
 
 def _missing(parent: str, name: str, last: str, fields: Mapping[str, Quantity], family: object) -> str:
-    """The sentence about a field or a table that is missing in its parent table."""
+    """The sentence about a field or a table that is missing in its parent table.
+
+    Args:
+        parent: dotted name of that table; empty for the top of the file.
+        name: dotted name of what is missing.
+        last: its name within the parent.
+        fields: the fields of the parent.
+        family: the family that the file names.
+    """
     if last in fields:
         quantity = fields[last]
         start = f"{name} is missing ({quantity.meaning}); add {last}"
@@ -191,6 +207,7 @@ def _missing(parent: str, name: str, last: str, fields: Mapping[str, Quantity], 
 
 
 def _look_up(document: Document, path: list[str]) -> object:
+    """Return what stands at a path; if a value stands on the way, in the place of a table, that value."""
     value: Any = document
     for key in path:
         value = value.get(key) if isinstance(value, dict) else value

@@ -36,7 +36,7 @@ from kinetostat.machine.loads import platform_is_loaded
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, shorten
-from kinetostat.spec.fields import positive
+from kinetostat.spec.fields import positive_number
 from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.tolerance_table import Tolerance, joined_tolerances, read_tolerances
 from kinetostat.studies.allocation import Allocation, allocation_for, reach_of
@@ -385,7 +385,7 @@ def _answer(
         loads_left_out=sums.state.left_out,
     )
     if allocate is not None:
-        wanted = positive(allocate, "length", "allocate, the wanted error,")
+        wanted = positive_number(allocate, "length", "allocate, the wanted error,")
         allocation = allocation_for(sums.parts, sums.reach, wanted, by, answer.leading)
         answer = replace(answer, allocation=allocation)
     return replace(answer, message=_message(answer))

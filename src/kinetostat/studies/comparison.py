@@ -21,8 +21,8 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, find, parameters, values
-from kinetostat.spec.arguments import checked
-from kinetostat.spec.errors import InputError, several
+from kinetostat.spec.arguments import as_list, checked
+from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import parse_range
 from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.analysis import Analysis, analyze
@@ -176,7 +176,7 @@ def compare(
         InputError: fewer than two designs or too many, ranges or poses that one of them does not take, both of them, or
             a quantity that none of them has.
     """
-    designs, ranges = [designs] if isinstance(designs, str) else designs, several(ranges)
+    designs, ranges = [designs] if isinstance(designs, str) else designs, as_list(ranges)
     if not 2 <= len(designs) <= MOST_DESIGNS:
         raise InputError(
             f"compare takes 2 to {MOST_DESIGNS} designs, not {len(designs)}; give files, names or NAME:path=value."
@@ -186,7 +186,7 @@ def compare(
         raise InputError("the poses come from a list or from ranges, not from both; leave one of them out.")
     for design in read_designs:
         _refuse_absent(design, ranges)
-    analyses, names, where = [design.analysis for design in read_designs], several(quantities), ""
+    analyses, names, where = [design.analysis for design in read_designs], as_list(quantities), ""
     if ranges:
         where = f"over {', '.join(ranges)}"
     elif poses is not None:

@@ -22,9 +22,9 @@ from kinetostat.engine.points import Axis, Grid
 from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter
-from kinetostat.spec.arguments import checked
-from kinetostat.spec.errors import InputError, several
-from kinetostat.spec.fields import positive
+from kinetostat.spec.arguments import as_list, checked
+from kinetostat.spec.errors import InputError
+from kinetostat.spec.fields import positive_number
 from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.commanding import (
@@ -246,7 +246,7 @@ def correction_table(
             tensions that are to be chosen.
     """
     refuse_tensions(machine)
-    pairs = chosen_axes(machine, several(over))
+    pairs = chosen_axes(machine, as_list(over))
     if not pairs:
         raise InputError('over is empty; give an axis of the table, e.g. "gravity_angle=0 deg:90 deg:7".')
     grid = grid_of(pairs)
@@ -254,7 +254,7 @@ def correction_table(
         raise InputError(
             f"the table has {grid.size:,} points; at most {MOST_TABLE_POINTS:,} are computed: lower the counts."
         )
-    greatest_error = None if tolerance is None else positive(tolerance, "length", "tolerance")
+    greatest_error = None if tolerance is None else positive_number(tolerance, "length", "tolerance")
     middles = Grid([Axis(axis.paths, 0.5 * (axis.values[1:] + axis.values[:-1])) for axis in grid.axes])
     # Together, so that a table whose cells have no place is still a table.
     of_cells = middles.columns(0, middles.size)

@@ -25,8 +25,8 @@ from kinetostat.kinematics.status import Status
 from kinetostat.late import LateModule
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, Parameter, find, values
-from kinetostat.spec.arguments import checked
-from kinetostat.spec.errors import InputError, several, shorten
+from kinetostat.spec.arguments import as_list, checked
+from kinetostat.spec.errors import InputError, shorten
 from kinetostat.studies.poses import PoseColumns
 from kinetostat.studies.quantities import (
     cable_count,
@@ -113,7 +113,7 @@ def answers_at(
     Raises:
         InputError: an unknown quantity, or one that the machine cannot have.
     """
-    wanted, parts = several(quantities), machine.family.component_names
+    wanted, parts = as_list(quantities), machine.family.component_names
     matrices = tuple(dict.fromkeys(name for name in wanted if name in MATRICES))
     state, cables = _state_and_cables(Identical(machine))
     names = tuple(resolve_quantities([name for name in wanted if name not in MATRICES], parts, cables))
@@ -234,7 +234,7 @@ def compile(  # noqa: A001 - `kinetostat.compile` is what users write
     Raises:
         InputError: an unknown field, or the same one twice; an unknown quantity, or one that the machine cannot have.
     """
-    return CompiledFunction(machine, tuple(several(inputs)), quantities, judged)
+    return CompiledFunction(machine, tuple(as_list(inputs)), quantities, judged)
 
 
 class CompiledFunction:
@@ -388,7 +388,7 @@ def _named_quantities(machine: Machine, requested: str | Sequence[str]) -> tuple
     parts = machine.family.component_names
     if isinstance(requested, str) and requested in MATRICES:
         return tuple(entry_name(requested, row, column) for row in parts for column in parts), (len(parts), len(parts))
-    names = [requested] if isinstance(requested, str) else several(requested)
+    names = [requested] if isinstance(requested, str) else as_list(requested)
     if any(name in MATRICES for name in names):
         raise InputError('quantities has a matrix among others; compile it alone, e.g. quantities="K".')
     resolved = tuple(resolve_quantities(names, parts, cable_count(machine)))

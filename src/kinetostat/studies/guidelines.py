@@ -34,8 +34,8 @@ from kinetostat.kinetostatics.elements import (
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, Parameter, parameters, values
-from kinetostat.spec.arguments import checked
-from kinetostat.spec.errors import InputError, several
+from kinetostat.spec.arguments import as_list, checked
+from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.attribution import strongest_first
@@ -186,7 +186,7 @@ def guidelines(machine: Machine | MachineState, ranges: Sequence[str] = (), prog
     Raises:
         InputError: a bad range, one that is not of a coordinate of the pose, or too many poses.
     """
-    state, ranges = state_of(machine), several(ranges)
+    state, ranges = state_of(machine), as_list(ranges)
     machine = state.machine
     grid = _grid(machine, ranges) if ranges else None
     sensitivities, names = sensitivity(state), machine.family.component_names

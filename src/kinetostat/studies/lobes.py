@@ -22,7 +22,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, shorten
-from kinetostat.spec.fields import Quantity, positive
+from kinetostat.spec.fields import Quantity, positive_number
 from kinetostat.studies.directions import unit_direction
 from kinetostat.studies.poses import chosen_axes, grid_of
 from kinetostat.studies.tool_receptance import read_tool
@@ -189,7 +189,7 @@ def _engagement_of(
             f'Nothing says the cutting pressure of {machine.name}; write pressure = "2000 N/mm**2" under [cutting], or '
             "give cutting_pressure."
         )
-    pressure = positive(written, "cutting pressure", "cutting_pressure")
+    pressure = positive_number(written, "cutting pressure", "cutting_pressure")
     if teeth is None:
         if not any(cutting.direction):
             raise InputError(

@@ -23,7 +23,8 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.orientation import ANGLE, ANGLES, COMPONENT, angles_of, from_parts, numbers_for, part_of
 from kinetostat.machine.parameters import POSE, Parameter, find, parameters
-from kinetostat.spec.errors import InputError, several, shorten
+from kinetostat.spec.arguments import as_list
+from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, Range, parse_range, quantities
 from kinetostat.units import UnitError, parse
 
@@ -429,7 +430,7 @@ def chosen_axes(machine: Machine, ranges: Sequence[str]) -> list[tuple[Range, Pa
     Raises:
         InputError: an unknown field, a bad range, a field twice, or more than six dimensions.
     """
-    ranges = several(ranges)
+    ranges = as_list(ranges)
     if len(ranges) > MOST_DIMENSIONS:
         raise InputError(
             f"the grid has {len(ranges)} dimensions; at most {MOST_DIMENSIONS} are allowed: "

@@ -22,7 +22,8 @@ from kinetostat.machine.limits import LIMITS, About, Parts
 from kinetostat.machine.loads import moving_masses, platform_is_loaded
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import Parameter, values, with_values
-from kinetostat.spec.errors import InputError, several
+from kinetostat.spec.arguments import as_list
+from kinetostat.spec.errors import InputError
 from kinetostat.spec.renamed import current_name
 from kinetostat.units import KINDS
 
@@ -70,7 +71,7 @@ def resolve_quantities(
     """
     groups = _groups(tuple(components), cables)
     resolved: list[str] = []
-    for name in (current_name(given, "quantity") for given in several(names)):
+    for name in (current_name(given, "quantity") for given in as_list(names)):
         if name not in GROUPS and not (name in QUANTITIES and _exists(name, components)):
             raise InputError(_no_quantity(name, groups, components))
         resolved += groups.get(name, [name])

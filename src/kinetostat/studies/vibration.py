@@ -22,7 +22,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.machine import springs as springs_of
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
-from kinetostat.spec.fields import positive
+from kinetostat.spec.fields import positive_number
 from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.attribution import largest_contributors, parts_and_kinds
 from kinetostat.studies.directions import unit_direction
@@ -272,7 +272,7 @@ def _direction_and_pressure(
     direction = tuple(along) or (tuple(cutting.direction) if any(cutting.direction) else ())
     if cutting_pressure is None:
         return direction, cutting.pressure or None
-    pressure = positive(cutting_pressure, "cutting pressure", "cutting_pressure")
+    pressure = positive_number(cutting_pressure, "cutting pressure", "cutting_pressure")
     if not direction:
         raise InputError("cutting_pressure needs the direction across the cut; give along as well, e.g. 1,0,0.")
     return direction, pressure
@@ -285,7 +285,7 @@ def frequency_ends(lowest: float | str | None, highest: float | str | None) -> t
         InputError: an end is not a frequency above 0, or the lowest is not below the highest.
     """
     low, high = (
-        None if end is None else positive(end, "frequency", name)
+        None if end is None else positive_number(end, "frequency", name)
         for end, name in ((lowest, "lowest"), (highest, "highest"))
     )
     if low is not None and high is not None and low >= high:

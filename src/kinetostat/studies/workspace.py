@@ -22,8 +22,8 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import rest_numbers
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import values
-from kinetostat.spec.arguments import checked
-from kinetostat.spec.errors import InputError, several
+from kinetostat.spec.arguments import as_list, checked
+from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.datasets import IN_MEMORY, LOADS_LEFT_OUT, GridQuestion, answer, grid_question
@@ -204,7 +204,7 @@ def workspace(
         raise InputError(f"seed is {seed}; give a whole number from 0.")
     state = state_of(machine)
     machine = state.machine
-    judge = Judge(state, tuple(parse_condition(text, machine.family.component_names) for text in several(conditions)))
+    judge = Judge(state, tuple(parse_condition(text, machine.family.component_names) for text in as_list(conditions)))
     question = grid_question(state, ranges, judge.quantities)
     _check(question)
     total = question.grid.size + Cells(question.grid.axes).size

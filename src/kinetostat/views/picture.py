@@ -18,8 +18,8 @@ from PIL import Image, ImageDraw, ImageFont
 from kinetostat.arrays import Float32s
 from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
-from kinetostat.spec.arguments import checked
-from kinetostat.spec.errors import InputError, choice, several, shorten
+from kinetostat.spec.arguments import as_list, checked
+from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.views.rendering.camera import VIEWPOINTS, Camera, Hits, Triangles, camera_on, hits_of
 from kinetostat.views.rendering.light import (
     LARGEST_GROUND_MAP,
@@ -127,7 +127,7 @@ def picture(
     """
     _check_size(size)
     paper = PAPERS[choice(theme, PAPERS, "theme")]
-    scene = _without_layers(scene, several(hidden))
+    scene = _without_layers(scene, as_list(hidden))
     opaque_solids = [solid for solid in scene.solids if LOOKS[solid.material].opacity == 1.0]
     bodies = _bodies_of(scene.solids, opaque_solids)
     camera = camera_on(np.concatenate([body.points for body in bodies]), _direction(view), *size)

@@ -16,9 +16,9 @@ from kinetostat.arrays import Array
 from kinetostat.display import number
 from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
-from kinetostat.spec.arguments import checked
-from kinetostat.spec.errors import InputError, several, shorten
-from kinetostat.spec.fields import Quantity, positive
+from kinetostat.spec.arguments import as_list, checked
+from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.fields import Quantity, positive_number
 from kinetostat.studies.identification.fit import Fit, FitOptions, Tell, best_fit
 from kinetostat.studies.identification.measurements import EULER, ROTATION, Measurements, Sigmas, read_measurements
 from kinetostat.studies.identification.next_poses import MOST_PROPOSED, NextPoses, first_poses, next_poses, unit_of
@@ -148,8 +148,8 @@ def identify(
     if not 0 <= more <= MOST_PROPOSED:
         raise InputError(f"more (--next) is {more}; give a whole number of poses from 0 to {MOST_PROPOSED}.")
     sigmas = Sigmas(
-        positive(sigma, "length", "sigma") if sigma else USUAL_SIGMA,
-        positive(sigma_angle, "angle", "sigma_angle") if sigma_angle else 0.0,
+        positive_number(sigma, "length", "sigma") if sigma else USUAL_SIGMA,
+        positive_number(sigma_angle, "angle", "sigma_angle") if sigma_angle else 0.0,
         bool(sigma or sigma_angle),
     )
     if not sigmas.angle:
@@ -183,7 +183,7 @@ def identification_of(
     Raises:
         InputError: as for `identify`.
     """
-    unknowns = _errors_named(model, fit) if several(fit) or not ties else []
+    unknowns = _errors_named(model, fit) if as_list(fit) or not ties else []
     tied = {name: _tied_error(model, name, terms) for name, terms in (ties or {}).items()}
     unknowns += [unknown for unknown, _ in tied.values()]
     unknowns += [place_unknown(path) for path in _place_paths(data, frame, target)]
@@ -225,10 +225,10 @@ def _errors_named(model: ErrorModel, patterns: Sequence[str]) -> list[MachineErr
     Raises:
         InputError: a pattern names nothing.
     """
-    if not several(patterns):
+    if not as_list(patterns):
         raise InputError(f'fit is empty; name groups or paths of what is to be found, e.g. "{USUALLY_FITTED[0]}".')
     paths: set[str] = set()
-    for pattern in several(patterns):
+    for pattern in as_list(patterns):
         named = [e.path for e in model.errors if e.group == pattern or _matches(e, pattern)]
         if not named:
             near = ", ".join(dict.fromkeys(e.group for e in model.errors))
