@@ -11,7 +11,7 @@ from kinetostat.algebra.symmetric import Symmetric6
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector
 from kinetostat.arrays import Array, Mask
 from kinetostat.kinetostatics.response import Response, respond
-from kinetostat.machine.common_tables import COMMON, Tool
+from kinetostat.machine.common_tables import COMMON_TABLES, Tool
 from kinetostat.machine.machine import Configuration, Family, Machine
 
 U = float(np.finfo(float).eps)
@@ -112,7 +112,7 @@ def placed(configuration: Configuration, reference: Vector | None = None) -> Mac
     """A machine that stands as it is placed, with its tool at `reference` (base frame, m): at P if not given."""
     home = configuration.platform.inverse()
     offset = ZERO if reference is None else home.apply(reference)
-    sections = {**{name: table() for name, table in COMMON.items()}, "tool": Tool(offset.components())}
+    sections = {**{name: table() for name, table in COMMON_TABLES.items()}, "tool": Tool(offset.components())}
     return Machine("placed", Family("placed", "", {}, lambda: configuration), sections)
 
 

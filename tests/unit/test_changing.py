@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from kinetostat.machine.loading import changed, load, read_again, related
+from kinetostat.machine.loading import changed, is_checked_against_others, load, read_again
 from kinetostat.machine.parameters import read_numbers, values
 from refusals import refused
 
@@ -45,11 +45,11 @@ def test_out_of_bounds_is_refused():
 
 def test_only_what_depends_on_other_numbers_is_checked_again():
     family, written = load(MACHINE), load("tripteron")
-    assert not related(family, "geometry.base_radius")
-    assert related(family, "limits.longest_leg")
-    assert related(written, "legs.z.elbow.axis.0")
-    assert not related(written, "legs.z.slide.stiffness")
-    assert not related(written, "pose.x")
+    assert not is_checked_against_others(family, "geometry.base_radius")
+    assert is_checked_against_others(family, "limits.longest_leg")
+    assert is_checked_against_others(written, "legs.z.elbow.axis.0")
+    assert not is_checked_against_others(written, "legs.z.slide.stiffness")
+    assert not is_checked_against_others(written, "pose.x")
 
 
 def test_a_rebuilt_machine_is_the_same_or_refused():

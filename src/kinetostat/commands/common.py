@@ -233,7 +233,7 @@ def load_machine(options: argparse.Namespace, more: "Sequence[str]" = ()) -> "Ma
     Raises:
         InputError: there is no such machine, or the file or an override has a mistake.
     """
-    from kinetostat.machine.loading import STUDY, bundled, load
+    from kinetostat.machine.loading import STUDY_REFUSAL, bundled, load
     from kinetostat.spec.document import exists
     from kinetostat.spec.errors import InputError
 
@@ -241,7 +241,7 @@ def load_machine(options: argparse.Namespace, more: "Sequence[str]" = ()) -> "Ma
         from kinetostat.studies.bundled import bundled_studies
 
         if options.machine in bundled_studies():
-            raise InputError(f'"{options.machine}" {STUDY}')
+            raise InputError(f'"{options.machine}" {STUDY_REFUSAL}')
     return as_wanted(options, load(options.machine, [*options.settings, *more]))
 
 

@@ -17,7 +17,7 @@ from kinetostat.algebra.vector import Rotation, Vector
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.mobility import task_coordinates
-from kinetostat.machine.common_tables import COMMON, Load, Tool
+from kinetostat.machine.common_tables import COMMON_TABLES, Load, Tool
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring
 from kinetostat.machine.limits import LIMITS, OF_DRIVES, is_set, limits_set, unloaded_parts
 from kinetostat.machine.link import Parallelogram
@@ -125,7 +125,7 @@ def document_of(machine: Machine, built: Configuration | None = None) -> Documen
 
 def _changed_entries(machine: Machine, name: str) -> Document:
     """Return the entries of a common table that are not the usual ones, and those of single drives."""
-    usual = vars(COMMON[name]())
+    usual = vars(COMMON_TABLES[name]())
     entries = {field: value for field, value in vars(machine.tables[name]).items() if value != usual[field]}
     paths = [path for path, _ in machine.family.own_drives if path.startswith(f"{name}.")]
     return entries | {path.partition(".")[2]: dict(vars(machine.tables[path])) for path in paths}

@@ -21,7 +21,7 @@ from kinetostat.algebra.scalar import Scalar, arctan2, is_zero, reciprocal
 from kinetostat.algebra.vector import Vector
 from kinetostat.frozen import dataclass
 from kinetostat.machine.column import plain
-from kinetostat.machine.common_tables import COMMON
+from kinetostat.machine.common_tables import COMMON_TABLES
 from kinetostat.machine.leg import Joint, Leg, PartName, Spring, Turn
 from kinetostat.machine.links import rods
 from kinetostat.machine.machine import Chains, Configuration, Family, Machine
@@ -243,7 +243,7 @@ def family_with_own_drives(family: Family, document: Document, origin: str) -> F
     """
     tables = []
     for table in TABLES_OF_DRIVES:
-        known, written = quantities(COMMON[table]), document.get(table)
+        known, written = quantities(COMMON_TABLES[table]), document.get(table)
         entries = written.items() if isinstance(written, dict) else ()
         for name, fields in entries:
             if name in known or not isinstance(fields, dict):

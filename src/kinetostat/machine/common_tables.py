@@ -209,7 +209,7 @@ class NamedLoad:
 STATES = {"free": False, "loaded": True}
 """Words of `state` in the table [load], and whether the machine is then shown at rest under its loads."""
 
-COMMON = {
+COMMON_TABLES = {
     "tool": Tool,
     "drives": Drives,
     "servo": ServoGains,
@@ -229,7 +229,7 @@ def table_of_one_drive(path: str, fields: Sequence[str]) -> type:
         path: the path of the table, such as "servo.leg 1".
         fields: names of the fields; the table of all drives, "servo" here, has them as well.
     """
-    known = quantities(COMMON[path.partition(".")[0]])
+    known = quantities(COMMON_TABLES[path.partition(".")[0]])
     return made_table("DriveTable", {field: Field(known[field]) for field in fields})
 
 

@@ -226,7 +226,7 @@ Known: TypeAlias = Mapping[str, float | list[float]]
 them for a field with several entries; 0 where it is not known. Empty where no cross-section is written."""
 
 
-def resolve(document: Document, family: Family, origin: str) -> Document:
+def with_rigidities(document: Document, family: Family, origin: str) -> Document:
     """A copy of a document in which each rigidity written as a cross-section is a number, SI.
 
     What such a link weighs per length, its least E I and its expansion go into the tables of the links, unless the

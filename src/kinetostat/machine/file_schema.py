@@ -14,7 +14,7 @@ from typing import Any, Literal, get_type_hints
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, create_model
 
 from kinetostat.machine.catalogue import families
-from kinetostat.machine.common_tables import COMMON, STATES, Drives, NamedLoad, ServoGains
+from kinetostat.machine.common_tables import COMMON_TABLES, STATES, Drives, NamedLoad, ServoGains
 from kinetostat.machine.cross_section import MATERIALS, SHAPE_KINDS, SHAPES
 from kinetostat.machine.orientation import ANGLES, orientation_schema
 from kinetostat.machine.written.joints import JOINT_TYPES, MOTORS, SEAT
@@ -148,7 +148,7 @@ def _written_file() -> Schema:
             "pose": {**_table({**dict.fromkeys(SPATIAL_POSE, QUANTITY), **orientation_schema()}), "minProperties": 1},
             "sections": {"type": "object", "additionalProperties": _cross_section()},
             "legs": {"type": "array", "minItems": 1, "items": _leg()},
-            **{name: {"type": "object"} for name in COMMON},
+            **{name: {"type": "object"} for name in COMMON_TABLES},
             "display": DISPLAY_SCHEMA,
         },
         ["name", "family", "platform", "pose", "legs"],

@@ -15,8 +15,8 @@ from kinetostat.display import ENGINEERING, Display, read_display
 from kinetostat.late import LateModule
 from kinetostat.machine.actuators import check_own_drives, family_with_own_drives
 from kinetostat.machine.catalogue import families, family_named
-from kinetostat.machine.common_tables import COMMON, STATES, NamedLoad, check_inertia
-from kinetostat.machine.cross_section import resolve
+from kinetostat.machine.common_tables import COMMON_TABLES, STATES, NamedLoad, check_inertia
+from kinetostat.machine.cross_section import with_rigidities
 from kinetostat.machine.leg import Leg
 from kinetostat.machine.limits import check_limits, unloaded_parts
 from kinetostat.machine.links import driven_slides
@@ -25,7 +25,7 @@ from kinetostat.machine.machine import Family, Machine, Written
 from kinetostat.machine.orientation import form_of, remove_replaced_form, with_angles
 from kinetostat.machine.parameters import POSE, Given, check_contrast, find_field, numbered_entry, with_values
 from kinetostat.machine.series import family_with_parts, with_named_parts
-from kinetostat.machine.written.plan import CABLE, NAME, PLANAR_POSE, SPATIAL_POSE, SUMMARY, Plan
+from kinetostat.machine.written.plan import CABLE, NAME, PLANAR_POSE, SPATIAL_POSE, SUMMARY
 from kinetostat.spec import document as documents
 from kinetostat.spec.arguments import as_list, checked
 from kinetostat.spec.document import Document
@@ -48,11 +48,16 @@ else:
     written_family = LateModule("kinetostat.machine.written.family")
 
 SUFFIX = ".toml"
-STUDY = (
+"""End of the names of machine files."""
+STUDY_REFUSAL = (
     "is a study, but this command takes a machine; name the machine that the study gives as machine = ..., or use "
     "`kinetostat check`, `optimize` or `report`, which take studies."
 )
 """The message for a study in the place of a machine."""
+TOP_LEVEL_KEYS = ("schema", "name", "family", "display", "sections", TABLE, TOLERANCES)
+"""Keys of a file at its top beside the tables of its family."""
+CHECKED_ALONE = ("pose", "tool", "load")
+"""Tables of machines written leg by leg whose numbers are checked by themselves, and not against others."""
 
 
 @checked
@@ -105,40 +110,45 @@ def build(document: str | Document, origin: str = "the machine", settings: Seque
         overrides = _in_full(tables, settings)
         return replace(build(tables, origin, overrides), written=Written(document, tuple(overrides)))
     if documents.is_study(document):
-        raise InputError(f'"{origin}" {STUDY}')
-    rest, others, required = take_requirements(document, _in_full(document, settings), origin)
-    rest, others, tolerated = take_tolerances(rest, others, origin)
+        raise InputError(f'"{origin}" {STUDY_REFUSAL}')
+    rest, overrides, requirements = take_requirements(document, _in_full(document, settings), origin)
+    rest, overrides, tolerances = take_tolerances(rest, overrides, origin)
     build_kind = _build_written if rest.get("family") == NAME else _build_family
-    machine = build_kind(rest, origin, others)
-    return replace(machine, requirements=required, tolerances=tolerated, whole_check=checked_as_file)
+    machine = build_kind(rest, origin, overrides)
+    return replace(machine, requirements=requirements, tolerances=tolerances, whole_check=checked_as_file)
 
 
 def _in_full(document: Document, settings: Sequence[str]) -> list[str]:
     """Write overrides with the whole path of their fields: "x=5 mm" as "pose.x=5 mm"."""
     pairs = ((setting, *setting.partition("=")) for setting in as_list(settings))
     return [
-        f"{_whole_path(document, numbered_entry(name.strip()))}={value}" if sign and name.strip() else given
-        for given, name, sign, value in pairs
+        f"{_whole_path(document, numbered_entry(name.strip()))}={value}" if sign and name.strip() else as_written
+        for as_written, name, sign, value in pairs
     ]
 
 
 def _whole_path(document: Document, name: str) -> str:
+    """Return the whole path of a field that an override names; paths that begin with a table stay as they are."""
     kind, head = document.get("family"), name.partition(".")[0]
     if form_of(name) and not name.startswith("pose"):
         return f"{POSE}{name}"
     if kind == NAME:
         return f"{POSE}{name}" if name in (*SPATIAL_POSE, *PLANAR_POSE) else _common_path(document, name)
     family = family_named(kind) if isinstance(kind, str) else None
-    if family is None or head in {*KEYS, *document, *(table.partition(".")[0] for table in family.every_table)}:
+    if family is None:
         return name
-    return find_field(family, name).path
+    tables = {table.partition(".")[0] for table in family.every_table}
+    return name if head in {*TOP_LEVEL_KEYS, *document, *tables} else find_field(family, name).path
 
 
 def _common_path(document: Document, name: str) -> str:
-    """Return the path of a field of a common table that is named by its end, "force.0", if nothing else is so named."""
+    """Return the path of a field of a common table that is named by its end, "force.0", if nothing else is so named.
+
+    Names of legs and joints are not known yet, so that every key in their tables counts as such a name.
+    """
     head = name.partition(".")[0]
-    tables = [table for table, fields in COMMON.items() if head in quantities(fields)]
-    elsewhere = {*KEYS, *document, *_keys_within([document.get("legs"), document.get("sections")])}
+    tables = [table for table, fields in COMMON_TABLES.items() if head in quantities(fields)]
+    elsewhere = {*TOP_LEVEL_KEYS, *document, *_keys_within([document.get("legs"), document.get("sections")])}
     return f"{tables[0]}.{name}" if len(tables) == 1 and head not in elsewhere else name
 
 
@@ -151,12 +161,6 @@ def _keys_within(data: object) -> Iterator[str]:
         yield from _keys_within(entry)
 
 
-KEYS = ("schema", "name", "family", "display", "sections", TABLE, TOLERANCES)
-"""Keys of a file at its top beside the tables of its family."""
-INDEPENDENT = ("pose", "tool", "load")
-"""Tables whose numbers need only be checked by themselves."""
-
-
 def _build_family(document: Document, origin: str, settings: Sequence[str]) -> Machine:
     """A machine of a family in closed form."""
     family = _family(document.get("family"), origin)
@@ -164,10 +168,9 @@ def _build_family(document: Document, origin: str, settings: Sequence[str]) -> M
     counts = _list_lengths(family_with_parts(family, document))
     document = _with_overrides(document, settings, counts, tuple(quantities(family.tables["pose"])), origin)
     document = with_named_parts(document, family, origin)  # those that overrides have written
-    display, loaded = _take_display(document, origin), _take_state(document, origin)
-    extended = family_with_loads(family_with_parts(family, document), document, origin)
-    extended = family_with_own_drives(extended, document, origin)
-    machine = _validated_machine(extended, resolve(document, family, origin), origin, display)
+    tables, display, loaded = _without_display_and_state(document, origin)
+    extended = _extended_family(family_with_parts(family, tables), tables, origin)
+    machine = _validated_machine(extended, with_rigidities(tables, family, origin), origin, display)
     configuration = machine.configure()
     parts = unloaded_parts(configuration.legs, configuration.platform.rotation.z, family.planar)
     check_limits(machine.tables["limits"], parts, origin)
@@ -176,48 +179,57 @@ def _build_family(document: Document, origin: str, settings: Sequence[str]) -> M
 
 
 def _build_written(document: Document, origin: str, settings: Sequence[str]) -> Machine:
-    """A machine written leg by leg."""
+    """A machine written leg by leg.
+
+    Its numbers are checked with the plan as the file has it. Then they tell which legs have a closed form and which
+    freedoms are idle; both belong to the plan, and so to the family that the machine gets.
+    """
     document = legs_of_file.by_name(document, origin)
     legs_of_file.check_paths(document, settings)
     coordinates = PLANAR_POSE if document.get("space") == "planar" else SPATIAL_POSE
     document = legs_of_file.with_parts(_with_overrides(document, settings, {}, coordinates, origin), origin)
-    display, loaded = _take_display(document, origin), _take_state(document, origin)
-    plan, numbers = legs_of_file.separate(document, origin)
-    machine = _validated_machine(_written_family(plan, numbers, origin), numbers, origin, display)
+    tables, display, loaded = _without_display_and_state(document, origin)
+    plan, numbers = legs_of_file.separate(tables, origin)
+    family = _extended_family(written_family.family_of(plan), numbers, origin)
+    machine = _validated_machine(family, numbers, origin, display)
     checking.check_numbers(plan, machine.tables, origin)
-    family = _written_family(checking.complete_plan(plan, machine.family_tables), numbers, origin)
-    machine = with_values(replace(machine, family=family), {})  # its tables are then those of this family
+    plan = checking.complete_plan(plan, machine.family_tables)
+    family = _extended_family(written_family.family_of(plan), numbers, origin)
+    machine = with_values(replace(machine, family=family, loaded=loaded), {})  # its tables become those of this family
     chains = machine.chains()
     legs = [Leg(leg.name, tuple(s.element for s in steps)) for leg, steps in zip(plan.legs, chains.legs, strict=True)]
-    slides = [(leg.name, 0.0) for leg in legs for _ in driven_slides(leg.chain)]
+    slides = [(leg.name, 0.0) for leg in legs for _ in driven_slides(leg.chain)]  # 0.0: at home none has travelled
     parts = unloaded_parts(legs, chains.home.rotation.z, plan.planar, slides)
     check_limits(machine.tables["limits"], parts, origin)
     check_own_drives(family, legs, origin)
-    return replace(machine, loaded=loaded)
+    return machine
 
 
-def _written_family(plan: Plan, numbers: Document, origin: str) -> Family:
-    """The family of a plan, with the tables of named loads and of single drives that a file has."""
-    return family_with_own_drives(family_with_loads(written_family.family_of(plan), numbers, origin), numbers, origin)
+def _extended_family(family: Family, document: Document, origin: str) -> Family:
+    """The family with the tables of named loads and of single drives that a document has."""
+    return family_with_own_drives(family_with_loads(family, document, origin), document, origin)
 
 
 def _with_overrides(
     document: Document, settings: Sequence[str], counts: Mapping[str, int], coordinates: Sequence[str], origin: str
 ) -> Document:
     """The document with overrides, and with its orientation, however it is written, in the angles of the pose."""
-    tables = [key for key in ("pose", *COMMON) if isinstance(document.get(key), dict)]
+    tables = [key for key in ("pose", *COMMON_TABLES) if isinstance(document.get(key), dict)]
     draft = {**document, **{key: copy.deepcopy(document[key]) for key in tables}}
     remove_replaced_form(draft, settings, coordinates, origin)
     for setting in settings:
-        _write_out(draft, setting.partition("=")[0].strip())
+        _write_out_default(draft, setting.partition("=")[0].strip())
     return with_angles(documents.override(draft, settings, counts), coordinates, origin)
 
 
-def _write_out(document: Document, path: str) -> None:
-    """Write out a list that a common table leaves to its default, if an override names an entry: `load.gravity.2`."""
+def _write_out_default(document: Document, path: str) -> None:
+    """Write out a list that a common table leaves to its default, if an override names an entry: `load.gravity.2`.
+
+    The document is changed; for all other paths it stays as it is.
+    """
     field, _, entry = path.rpartition(".")
     name, _, key = field.rpartition(".")
-    fields = COMMON.get(name, NamedLoad if name.startswith("load.") else None)
+    fields = COMMON_TABLES.get(name, NamedLoad if name.startswith("load.") else None)
     quantity = None if fields is None else quantities(fields).get(key)
     if quantity is None or quantity.count is None or not entry.isdecimal():
         return
@@ -237,21 +249,18 @@ def _validated_machine(family: Family, document: Document, origin: str, display:
     return machine
 
 
-def _take_display(document: Document, origin: str) -> Display:
-    """Take the table [display] out of a document."""
+def _without_display_and_state(document: Document, origin: str) -> tuple[Document, Display, bool]:
+    """Part a document into its tables of numbers, its display, and whether the machine is meant under its loads."""
+    tables = {key: value for key, value in document.items() if key != "display"}
     try:
-        return read_display(document.pop("display", {}))
+        display = read_display(document.get("display", {}))
     except UnitError as error:
         raise InputError(f'"{origin}": {error}.') from None
-
-
-def _take_state(document: Document, origin: str) -> bool:
-    """Take `state` out of the table [load] of a document: whether the machine is meant under its loads."""
     load = document.get("load")
     if not isinstance(load, dict) or "state" not in load:
-        return False
-    document["load"] = {key: value for key, value in load.items() if key != "state"}
-    return STATES[choice(load["state"], STATES, f'"{origin}": load.state')]
+        return tables, display, False
+    tables["load"] = {key: value for key, value in load.items() if key != "state"}
+    return tables, display, STATES[choice(load["state"], STATES, f'"{origin}": load.state')]
 
 
 def _list_lengths(family: Family) -> dict[str, int]:
@@ -303,7 +312,7 @@ def as_toml(machine: Machine, readable: bool = False) -> str:
         literals = {**literals, "load": {"state": machine.state}}
     for name in [*machine.tables, *(name for name in literals if name and name not in machine.tables)]:
         table = machine.tables.get(name)
-        if table is not None and name not in literals and _left_out(machine.family.every_table[name], table):
+        if table is not None and name not in literals and _holds_defaults(machine.family.every_table[name], table):
             continue
         lines += ["", f"[{'.'.join(documents.toml_key(part) for part in name.split('.'))}]"]
         lines += documents.toml_pairs(literals.get(name, {}))
@@ -314,8 +323,8 @@ def as_toml(machine: Machine, readable: bool = False) -> str:
     return "\n".join([*lines, *requirement_lines(machine.requirements), *tolerance_lines(machine.tolerances)]) + "\n"
 
 
-def _left_out(fields: type, table: Any) -> bool:
-    """Whether a table says nothing that is not so without it."""
+def _holds_defaults(fields: type, table: Any) -> bool:
+    """Whether a table holds only defaults, so that a file without it says the same."""
     return optional(fields) == set(quantities(fields)) and bool(table == fields())
 
 
@@ -352,17 +361,17 @@ def checked_as_file(machine: Machine, names: Iterable[str]) -> Machine:
     Raises:
         InputError: numbers contradict each other.
     """
-    return read_again(machine) if any(related(machine, name) for name in names) else machine
+    return read_again(machine) if any(is_checked_against_others(machine, name) for name in names) else machine
 
 
-def related(machine: Machine, path: str) -> bool:
+def is_checked_against_others(machine: Machine, path: str) -> bool:
     """Whether a field is checked against others: then `read_again` has the last word on a change."""
     if form_of(path):
         return False
     parameter = find_field(machine.family, path)
     table = parameter.path.split(".")[0]
     leg_by_leg = machine.family.chains is not None
-    return table == "limits" or (leg_by_leg and not parameter.quantity.stiff and table not in INDEPENDENT)
+    return table == "limits" or (leg_by_leg and not parameter.quantity.stiff and table not in CHECKED_ALONE)
 
 
 def read_again(machine: Machine) -> Machine:

@@ -14,7 +14,7 @@ from kinetostat.algebra.screw import COMPONENTS, Wrench
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
 from kinetostat.display import ENGINEERING, Display, read_display
 from kinetostat.frozen import dataclass
-from kinetostat.machine.common_tables import COMMON, STATES, NamedLoad, check_inertia, table_of_one_drive
+from kinetostat.machine.common_tables import COMMON_TABLES, STATES, NamedLoad, check_inertia, table_of_one_drive
 from kinetostat.machine.leg import Joint, Leg, Spring, Station, Turn
 from kinetostat.machine.links import LinkKind, link_tables
 from kinetostat.machine.orientation import numbers_for, single_angles
@@ -236,7 +236,7 @@ class Family:
         """Its own tables and the common ones."""
         named = {f"load.{name}": NamedLoad for name in self.loads}
         single = {path: table_of_one_drive(path, fields) for path, fields in self.own_drives}
-        return FixedDict({**self.tables, **link_tables(self.links), **COMMON, **single, **named})
+        return FixedDict({**self.tables, **link_tables(self.links), **COMMON_TABLES, **single, **named})
 
 
 @dataclass(frozen=True)

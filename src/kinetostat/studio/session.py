@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from kinetostat.equilibrium.state import state_of
 from kinetostat.frozen import dataclass
-from kinetostat.machine.loading import build, bundled, load, read_again, related
+from kinetostat.machine.loading import build, bundled, is_checked_against_others, load, read_again
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import Parameter, values
 from kinetostat.machine.saving import as_file
@@ -147,7 +147,7 @@ class Session:
             InputError: the numbers contradict each other; the machine is again as it was before the step.
         """
         paths, self._open_step = self._open_step, ()
-        if any(path != TYPED_TEXT and related(self.machine, path) for path in paths):
+        if any(path != TYPED_TEXT and is_checked_against_others(self.machine, path) for path in paths):
             try:
                 self.machine = read_again(self.machine)
             except InputError:
