@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 import pinocchio
 
-from kinetostat.engine.moving import Path, forces_on_path, rigid_form
+from kinetostat.engine.moving import PosePath, forces_on_path, rigid_form
 from kinetostat.equilibrium.state import state_of
 from kinetostat.exchange.mjcf import text_of
 from kinetostat.machine.loading import load
@@ -38,7 +38,7 @@ def massive(name: str) -> Machine:
     return load(name, [*MASSES, *DRIVES, *(f"{path}=2 kg/m" for path in links)])
 
 
-def circle(machine: Machine, count: int) -> Path:
+def circle(machine: Machine, count: int) -> PosePath:
     """A motion through all coordinates of the pose."""
     time_ = np.linspace(0.0, 1.0, count)
     pose, rates, gains = {}, {}, {}
@@ -47,7 +47,7 @@ def circle(machine: Machine, count: int) -> Path:
         angle = turning * time_ + k
         pose[name], rates[name] = here + 0.01 * np.sin(angle), 0.01 * turning * np.cos(angle)
         gains[name] = -0.01 * turning**2 * np.sin(angle)
-    return Path(pose, rates, gains)
+    return PosePath(pose, rates, gains)
 
 
 def mujoco_seconds(model: mujoco.MjModel) -> float:

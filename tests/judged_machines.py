@@ -18,8 +18,8 @@ from exact_engine import Answer, UndecidedRankError, UnsuitablePoseError, answer
 from ideal_machines import MECHANISMS, Draw
 from kinetostat import analyze, load
 from kinetostat.equilibrium.mechanism import mechanism_of
-from kinetostat.equilibrium.solving import at_rest, with_share
-from kinetostat.equilibrium.tangent import compliance, stability
+from kinetostat.equilibrium.solving import at_rest, stability, with_share
+from kinetostat.equilibrium.tangent import platform_compliance
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
@@ -97,7 +97,7 @@ def judge(path: Path, exact: Answer, length: float) -> Verdict:
     mechanism = with_share(mechanism_of(machine, response.configuration, joints), 0.0)
     solution = at_rest(mechanism)
     stands = bool(solution.settled.all()) and stability(solution.balance).stable
-    at_zero_load = compliance(solution.balance)[0] * mechanism.compliance_units[0]
+    at_zero_load = platform_compliance(solution.balance)[0] * mechanism.compliance_units[0]
     return Verdict(
         analysis.status,
         {

@@ -4,6 +4,8 @@ import ast
 import subprocess
 import sys
 from graphlib import TopologicalSorter
+from importlib import import_module
+from pathlib import Path
 
 from source import PACKAGE, ROOT, imports, modules, wrong_in
 
@@ -35,6 +37,7 @@ EDGES = ["commands", "cli", "studio", "__main__"]
 """Thin edges above all layers; nobody below imports them."""
 LONGEST = 450
 """Lines of a file."""
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 
 def ours(module: str) -> set[str]:
@@ -149,6 +152,23 @@ def test_frozen_classes_are_compiled_late():
         return {"dataclasses.dataclass"} & names if "frozen" in options else set()
 
     assert not wrong_in(by_the_standard_library, set(modules()) - {"kinetostat.frozen"})
+
+
+def lacking(tree: ast.Module) -> list[str]:
+    """What a program outside the package imports from it that is not there."""
+    froms = [n for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and (n.module or "").split(".")[0] == PACKAGE]
+    taken = [(node.module, alias.name) for node in froms for alias in node.names]
+    return [f"{m}.{n}" for m, n in taken if f"{m}.{n}" not in modules() and not hasattr(import_module(m), n)]
+
+
+def test_benchmarks_import_what_is_there():
+    """No test runs them, so that a new name would break them unseen."""
+    assert lacking(ast.parse("from kinetostat import load, loads\nfrom kinetostat.engine import moving")) == [
+        "kinetostat.loads"
+    ]
+    benchmarks = {path.name: ast.parse(path.read_text("utf-8")) for path in sorted(BENCHMARKS.glob("*.py"))}
+    assert benchmarks
+    assert not {name: lacking(tree) for name, tree in benchmarks.items() if lacking(tree)}
 
 
 def test_no_star_import():

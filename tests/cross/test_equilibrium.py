@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 from kinetostat import analyze, build, bundled, command, evaluate, forward, save, sensitivity, under_load
 from kinetostat.equilibrium.balance import balance, free_state, state_after
 from kinetostat.equilibrium.elastic_legs import FEW_POSES
-from kinetostat.equilibrium.solving import Rest
+from kinetostat.equilibrium.solving import Rest, newton_step
 from kinetostat.equilibrium.state import state_of
+from kinetostat.equilibrium.tangent import finite_solution
 from kinetostat.exchange.leg_by_leg import document_of
 from kinetostat.machine.loads import located_members
 from kinetostat.views.notebook import html_of
@@ -225,7 +226,7 @@ def test_legs_of_one_form_together_are_each_of_them_alone(name):
     """At more than a few poses, legs are evaluated one by one."""
     mechanism, rng = state_of(load_without_limits(name, [])).mechanism, np.random.default_rng(1)
     free, many = free_state(mechanism), np.zeros(FEW_POSES + 1, dtype=int)
-    step = rng.uniform(-0.1, 0.1, (1, mechanism.starts[-1]))
+    step = rng.uniform(-0.1, 0.1, (1, mechanism.unknown_places.count))
     amounts = rng.uniform(-0.1, 0.1, free.amounts.shape)
     state = replace(state_after(mechanism, free, step), amounts=amounts)
     together, alone = balance(mechanism, state), balance(mechanism.at(many), state.at(many))
@@ -235,6 +236,32 @@ def test_legs_of_one_form_together_are_each_of_them_alone(name):
         assert together.leg_rates(number)[0] == pytest.approx(alone.leg_rates(number)[-1], rel=1e-12, abs=1e-14)
         held, holds = (each.legs[number].holding for each in (together, alone))
         assert held[0] == pytest.approx(holds[-1], rel=1e-12, abs=1e-14)
+
+
+def test_one_pose_does_not_change_the_digits_of_the_others():
+    """Poses with a stiff leg are solved in another way than the others, and those that are nowhere not at all."""
+    mechanism = state_of(load_without_limits("hexapod", ["load.force=[10, 20, -30]"])).mechanism.at(
+        np.zeros(3, dtype=int)
+    )
+    first, *others = mechanism.legs
+    stiff = replace(first, stiffness=first.stiffness * [[1.0], [1e9], [np.nan]])
+    equations = balance(replace(mechanism, legs=(stiff, *others)), free_state(mechanism))
+    alone = balance(mechanism.at(np.array([0])), free_state(mechanism.at(np.array([0]))))
+    usual, with_stiff_leg, nowhere = newton_step(equations)
+    assert np.array_equal(usual, newton_step(alone)[0])
+    spring = mechanism.unknown_places.coordinates[0].start + [s is None for s in first.springs].index(False)
+    assert abs(with_stiff_leg[spring]) < 1e-6 * abs(usual[spring])
+    assert np.isnan(nowhere).all()
+
+
+def test_a_singular_pose_does_not_change_the_digits_of_the_others():
+    rng = np.random.default_rng(0)
+    matrices, right = rng.normal(size=(3, 6, 6)), rng.normal(size=(3, 6, 2))
+    matrices[1, :, 5], right[2] = 0.0, np.nan
+    solved = finite_solution(matrices, right)
+    assert np.array_equal(solved[0], np.linalg.solve(matrices[0], right[0]))
+    assert solved[1] == pytest.approx(np.linalg.pinv(matrices[1]) @ right[1])
+    assert np.isnan(solved[2]).all()
 
 
 def test_a_machine_whose_preloads_are_chosen_has_no_derivatives_under_load():

@@ -9,8 +9,8 @@ from kinetostat import analyze, evaluate, load
 from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, NO_ANSWER
 from kinetostat.equilibrium.mechanism import mechanism_of
-from kinetostat.equilibrium.solving import Rest, at_rest, with_share
-from kinetostat.equilibrium.tangent import compliance, stability
+from kinetostat.equilibrium.solving import Rest, at_rest, stability, with_share
+from kinetostat.equilibrium.tangent import platform_compliance
 from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
@@ -74,7 +74,7 @@ def test_the_loaded_machine_without_its_load_has_the_same_compliance(name):
     solution = at_rest(mechanism)
     assert solution.settled.all()
     assert stability(solution.balance).stable
-    tangent = compliance(solution.balance)[0] * mechanism.compliance_units[0]
+    tangent = platform_compliance(solution.balance)[0] * mechanism.compliance_units[0]
     expected = analyze(machine).C
     sizes = np.sqrt(np.diagonal(expected))
     assert np.all(abs(tangent - expected) <= ROUTES * np.outer(sizes, sizes))

@@ -57,7 +57,7 @@ def grown(machine, ways, force, width, period):
     """The factor by which a disturbance of the machine's tool grows from edge to edge."""
     vibration = modes(machine)
     solution = vibration.solution
-    assert solution.ringing == len(solution.inverse_squares)
+    assert solution.mode_count == len(solution.inverse_squares)
     return growth(
         solution.inverse_squares,
         vibration.damping.ratio,

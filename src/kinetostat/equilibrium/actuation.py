@@ -16,7 +16,7 @@ from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.equilibrium.balance import Balance, balance, free_state, platform_load
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.solving import Equilibria, at_rest
-from kinetostat.equilibrium.tangent import solve
+from kinetostat.equilibrium.tangent import solve_at_rest
 from kinetostat.frozen import dataclass
 from kinetostat.numerics.distribution import Balancing, Rule, distribution, within_bounds
 from kinetostat.numerics.iteration import Steps, largest, newton
@@ -56,7 +56,7 @@ def commanded_state(mechanism: Mechanism) -> CommandedState:
         state, settled[rows] = state.with_part(rows, rest.state), rest.settled
         error = logarithm(rest.state.platform)
         first_error[rows] = np.where(np.isnan(first_error[rows]), error, first_error[rows])
-        rates[rows] = solve(rest.balance, -rest.balance.by_actuators())[:, : ways.shape[1]]
+        rates[rows] = solve_at_rest(rest.balance, -rest.balance.by_actuators())[:, mechanism.unknown_places.twist]
         change = -np.einsum("nac,nc->na", np.linalg.pinv(rates[rows], rcond=UNRESISTED), error @ ways)
         return np.where(rest.settled, largest(error), np.nan), lambda unsolved: change[unsolved]
 

@@ -27,7 +27,7 @@ from kinetostat.numerics.motions import Motions, brackets_by, cross, exponential
 
 @dataclass(frozen=True)
 class State:
-    """A place of a mechanism with the loads of its legs, at n poses.
+    """A place of a mechanism with the wrenches on its legs, at n poses.
 
     Attributes:
         platform: displacement of the platform from the free state.
@@ -240,7 +240,7 @@ def potential(mechanism: Mechanism, state: State, before: Motions) -> Array:
     result = -np.einsum("nc,nc->n", mechanism.wrench[:, :3], turn)
     for point, force in _platform_forces(mechanism):
         result -= np.einsum("nc,nc->n", force, state.platform.point(point) - point)
-    amounts = np.concatenate([state.amounts, mechanism.growth], axis=1)
+    amounts = mechanism.given_amounts(state.amounts)
     for leg, coordinates in zip(mechanism.legs, state.coordinates, strict=True):
         loads = leg.stiffness * coordinates + leg.preload
         energy = 0.5 * (loads + leg.preload) * coordinates
@@ -302,32 +302,33 @@ class Balance:
 
     def by_actuators(self) -> Array:
         """Rates of the equations by the amounts of the actuators [n x unknowns x actuators]."""
-        ways, starts = self.mechanism.ways, self.mechanism.starts
+        ways, places = self.mechanism.ways, self.mechanism.unknown_places
         count = self.state.amounts.shape[1]
-        result = np.zeros((len(self.residual), starts[-1], count))
-        for leg, terms, start in zip(self.mechanism.legs, self.legs, starts, strict=False):
-            moving, wrench = slice(start, start + leg.size), slice(start + leg.size, start + leg.size + ways.shape[1])
-            result[:, moving] = terms.by_given[:, :, :count]
+        result = np.zeros((len(self.residual), places.count, count))
+        for terms, coordinates, wrench in zip(self.legs, places.coordinates, places.wrenches, strict=True):
+            result[:, coordinates] = terms.by_given[:, :, :count]
             result[:, wrench] = ways.T @ terms.driven[:, :, :count]
         return result
 
 
 def state_after(mechanism: Mechanism, state: State, step: Array) -> State:
     """Return the state after a step of the unknowns [n x unknowns]."""
-    ways, size = mechanism.ways, mechanism.ways.shape[1]
-    coordinates, wrenches = [], []
-    for k, (leg, start) in enumerate(zip(mechanism.legs, mechanism.starts, strict=False)):
-        coordinates.append(state.coordinates[k] + step[:, start : start + leg.size])
-        wrenches.append(state.wrenches[k] + step[:, start + leg.size : start + leg.size + size] @ ways.T)
-    platform = exponential(step[:, :size] @ ways.T) @ state.platform
-    return State(platform, tuple(coordinates), tuple(wrenches), state.amounts)
+    ways, places = mechanism.ways, mechanism.unknown_places
+    return State(
+        platform=exponential(step[:, places.twist] @ ways.T) @ state.platform,
+        coordinates=tuple(
+            before + step[:, part] for before, part in zip(state.coordinates, places.coordinates, strict=True)
+        ),
+        wrenches=tuple(
+            before + step[:, part] @ ways.T for before, part in zip(state.wrenches, places.wrenches, strict=True)
+        ),
+        amounts=state.amounts,
+    )
 
 
 def motion_of(mechanism: Mechanism, step: Array) -> Array:
     """Return the largest motion in a step of the unknowns, rad and units of the length [n]."""
-    moving = [step[:, : mechanism.ways.shape[1]]]
-    moving += [step[:, s : s + leg.size] for leg, s in zip(mechanism.legs, mechanism.starts, strict=False)]
-    return largest(np.concatenate(moving, axis=1))
+    return largest(step[:, mechanism.unknown_places.motions])
 
 
 def balance(mechanism: Mechanism, state: State) -> Balance:
@@ -335,7 +336,7 @@ def balance(mechanism: Mechanism, state: State) -> Balance:
     ways = mechanism.ways
     load, change = platform_load(mechanism, state.platform)
     poses = len(load)
-    amounts = np.concatenate([state.amounts, mechanism.growth], axis=1)
+    amounts = mechanism.given_amounts(state.amounts)
     terms: dict[int, LegTerms] = {}
     gaps: dict[int, Array] = {}
     for legs in mechanism.like_legs:
@@ -373,7 +374,7 @@ def loaded_links(equations: Balance, legs: tuple[Leg, ...], origin: Vector) -> t
     mechanism, state = equations.mechanism, equations.state
     length = float(mechanism.length[0])
     links: list[DeflectedLink] = []
-    given = np.concatenate([state.amounts, mechanism.growth], axis=1)
+    given = mechanism.given_amounts(state.amounts)
     for leg, elastic, coordinates in zip(legs, mechanism.legs, state.coordinates, strict=True):
         placed = elastic.chain.place(coordinates, given).before
         bodies = [placed[number] for number in elastic.motion_counts]

@@ -18,11 +18,10 @@ from kinetostat.equilibrium.balance import Balance, State, balance, potential, s
 from kinetostat.equilibrium.mechanism import Mechanism
 from kinetostat.equilibrium.tangent import (
     Admissible,
+    TangentMatrices,
     admissible,
     gaps_of,
     over_motions,
-    places_of,
-    starts_of,
     tangent_matrices,
 )
 from kinetostat.frozen import dataclass
@@ -36,9 +35,11 @@ LARGEST_RADIUS = 0.2
 MOST_CLOSINGS = 6
 """Greatest number of corrections that close the legs after a step; a step that needs more is too long."""
 BISECTIONS = 50
-"""Number of halvings in the search for the shift of the stiffness with which a step is as long as the radius."""
+"""Number of halvings in the search for the shift of the stiffness with which a step is as long as the radius: its
+bounds are then 2^-50 of their first distance apart, which is nearly round-off."""
 MOST_SWITCHES = 8
-"""Greatest number of times that one-sided springs switch between carrying and slack within a step."""
+"""Greatest number of times that one-sided springs switch between carrying and slack within a step; what switches on
+after that is left to the next step."""
 WIDENING = 2.0
 """Radius in lengths of the last step, after one that fell as foreseen; usual for trust regions, as the next three."""
 NARROWING = 0.25
@@ -66,15 +67,15 @@ def descent_from(mechanism: Mechanism, start: State) -> State:
         if not len(rows):
             break
         part = mechanism.at(rows)
-        step = _step(part, state.at(rows), radius[rows])
+        step = _step_within(part, state.at(rows), radius[rows])
         before = step.equations.state
         after, closed = _closed_state(part, state_after(part, before, step.unknowns))
         fall = potential(part, before, before.platform) - potential(part, after, before.platform)
         share = np.where(closed, fall, -1.0) / np.maximum(step.fall, ZERO_PIVOT)
-        lower = share > LEAST_SHARE
+        is_taken = share > LEAST_SHARE
         wider = np.where(share > GOOD_SHARE, np.maximum(radius[rows], WIDENING * step.size), radius[rows])
-        radius[rows] = np.where(lower, np.minimum(wider, LARGEST_RADIUS), NARROWING * step.size)
-        state = state.with_part(rows, before).with_part(rows[lower], after.at(np.flatnonzero(lower)))
+        radius[rows] = np.where(is_taken, np.minimum(wider, LARGEST_RADIUS), NARROWING * step.size)
+        state = state.with_part(rows, before).with_part(rows[is_taken], after.at(np.flatnonzero(is_taken)))
         rows = rows[step.size > NEARLY_AT_REST]
     return state
 
@@ -95,11 +96,11 @@ def _closed_state(mechanism: Mechanism, start: State) -> tuple[State, Mask]:
 
 def _closing_steps(equations: Balance) -> Array:
     """The least motions that close the legs to first order, as steps of the unknowns [n x unknowns]."""
-    unknowns = np.zeros_like(equations.residual)
-    moving, carried = places_of(equations)
-    for part in admissible(equations, tangent_matrices(equations)[2]):
-        shift = part.inverse @ equations.residual[part.rows][:, carried, None]
-        unknowns[part.rows[:, None], moving] = -shift[:, :, 0]
+    unknowns, places = np.zeros_like(equations.residual), equations.mechanism.unknown_places
+    moving, carried = places.motions, places.all_wrenches
+    for part in admissible(equations, tangent_matrices(equations).closing):
+        motion = part.closing_inverse @ equations.residual[part.rows][:, carried, None]
+        unknowns[part.rows[:, None], moving] = -motion[:, :, 0]
     return unknowns
 
 
@@ -120,20 +121,21 @@ class _Step:
     fall: Array
 
 
-def _step(mechanism: Mechanism, state: State, radius: Array) -> _Step:
+def _step_within(mechanism: Mechanism, state: State, radius: Array) -> _Step:
     """The step within a radius [n] to the lowest point that the model has there."""
-    equations = balance(mechanism, state)
-    moving, carried = places_of(equations)
-    unknowns = np.zeros_like(equations.residual)
-    size, fall = np.full((2, len(radius)), np.nan)
-    parts = list(admissible(equations, tangent_matrices(equations)[2]))
+    equations, places = balance(mechanism, state), mechanism.unknown_places
+    moving, carried = places.motions, places.all_wrenches
+    parts = list(admissible(equations, tangent_matrices(equations).closing))
+    balancing = np.zeros_like(equations.residual)
     for part in parts:
         residual = equations.residual[part.rows][:, moving, None]
-        unknowns[part.rows[:, None], carried] = (np.swapaxes(part.inverse, 1, 2) @ residual)[:, :, 0]
-    equations = balance(mechanism, state_after(mechanism, state, unknowns))
-    unknowns = np.zeros_like(unknowns)
+        balancing[part.rows[:, None], carried] = (np.swapaxes(part.closing_inverse, 1, 2) @ residual)[:, :, 0]
+    equations = balance(mechanism, state_after(mechanism, state, balancing))
+    matrices = tangent_matrices(equations)
+    unknowns = np.zeros_like(balancing)
+    size, fall = np.full((2, len(radius)), np.nan)
     for part in parts:
-        model = _model(equations, part)
+        model = _model(equations, matrices, part)
         step, fall[part.rows] = model.lowest_point(radius[part.rows])
         # A step without a fall counts as long as the radius, which then becomes smaller.
         size[part.rows] = np.where(fall[part.rows] > 0.0, np.linalg.norm(step, axis=1), radius[part.rows])
@@ -183,27 +185,29 @@ class _Model:
             stiffness = self.stiffness + np.einsum("nsi,ns,nsj->nij", self.lines, springs, self.lines)
             force = self.force - np.einsum("ns,nsi->ni", np.where(carries, self.loads, 0.0), self.lines)
             step = least_within(stiffness, force, radius)
-            lower = -self.change(step)
-            best, fall = np.where((lower > fall)[:, None], step, best), np.maximum(lower, fall)
+            fall_of_step = -self.change(step)
+            best, fall = np.where((fall_of_step > fall)[:, None], step, best), np.maximum(fall_of_step, fall)
             last, carries = carries, self.loads_after(step) >= 0.0
             if (last == carries).all():
                 break
         return best, fall
 
 
-def _model(equations: Balance, part: Admissible) -> _Model:
+def _model(equations: Balance, matrices: TangentMatrices, part: Admissible) -> _Model:
     """The model of the potential at those poses whose admissible motions these are."""
-    legs, starts = equations.mechanism.legs, starts_of(equations)
-    elastic, geometric, _ = (matrix[part.rows] for matrix in tangent_matrices(equations))
-    residual = equations.residual[part.rows][:, places_of(equations)[0]]
+    mechanism = equations.mechanism
+    elastic, geometric = matrices.elastic[part.rows], matrices.geometric[part.rows]
+    residual = equations.residual[part.rows][:, mechanism.unknown_places.motions]
     lines, loads, springs = [], [], []
-    for leg, coordinates, start in zip(legs, equations.state.coordinates, starts, strict=False):
+    moving_places = mechanism.motion_places.coordinates
+    for leg, coordinates, moving in zip(mechanism.legs, equations.state.coordinates, moving_places, strict=True):
         for i in np.flatnonzero(leg.sign):
+            place = moving.start + i
             loads.append((leg.sign[i] * (leg.stiffness[:, i] * coordinates[:, i] + leg.preload[:, i]))[part.rows])
             springs.append(leg.stiffness[part.rows, i])
-            lines.append(leg.sign[i] * part.motions[:, start + i])
-            elastic[:, start + i, start + i] = 0.0
-            residual[:, start + i] -= leg.sign[i] * np.maximum(loads[-1], 0.0)
+            lines.append(leg.sign[i] * part.motions[:, place])
+            elastic[:, place, place] = 0.0
+            residual[:, place] -= leg.sign[i] * np.maximum(loads[-1], 0.0)
     force = -(np.swapaxes(part.motions, 1, 2) @ residual[:, :, None])[:, :, 0]
     columns = [np.stack(column, axis=1) for column in (lines, loads, springs) if column]
     nothing = np.zeros((len(part.rows), 0))
@@ -226,16 +230,16 @@ def least_within(stiffness: Array, force: Array, radius: Array) -> Array:
     """
     values, vectors = np.linalg.eigh(stiffness)
     parts = np.einsum("nij,ni->nj", vectors, force)
-    lower = np.maximum(0.0, -values[:, 0])
-    upper = lower + np.linalg.norm(parts, axis=1) / radius
+    least_shift = np.maximum(0.0, -values[:, 0])
+    largest_shift = least_shift + np.linalg.norm(parts, axis=1) / radius
 
     def solution(shift: Array) -> Array:
         return parts / np.maximum(values + shift[:, None], ZERO_PIVOT)
 
-    inside = np.linalg.norm(solution(lower), axis=1) <= radius
-    upper = np.where(inside, lower, upper)
+    is_inside = np.linalg.norm(solution(least_shift), axis=1) <= radius
+    largest_shift = np.where(is_inside, least_shift, largest_shift)
     for _ in range(BISECTIONS):
-        middle = 0.5 * (lower + upper)
-        short = np.linalg.norm(solution(middle), axis=1) <= radius
-        lower, upper = np.where(short, lower, middle), np.where(short, middle, upper)
-    return np.einsum("nij,nj->ni", vectors, solution(upper))
+        middle = 0.5 * (least_shift + largest_shift)
+        is_short = np.linalg.norm(solution(middle), axis=1) <= radius
+        least_shift, largest_shift = np.where(is_short, least_shift, middle), np.where(is_short, middle, largest_shift)
+    return np.einsum("nij,nj->ni", vectors, solution(largest_shift))

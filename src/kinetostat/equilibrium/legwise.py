@@ -208,8 +208,7 @@ class CondensedLeg:
 
 def _terms_at(leg: ElasticLeg, mechanism: Mechanism, row: Row, acting: Array) -> tuple[PlacedChain, LegTerms]:
     """A leg at some coordinates, and its contribution to the equations while a wrench acts on it [6]."""
-    amounts = np.concatenate([np.zeros((1, len(mechanism.actuators))), mechanism.growth], axis=1)
-    coordinates = of_scalars(row)
+    coordinates, amounts = of_scalars(row), mechanism.undriven_amounts
     placed = leg.chain.place(coordinates, amounts)
     return placed, leg_terms(leg, coordinates, acting[None], amounts, mechanism.gravity, placed, symmetric=True)
 
@@ -333,9 +332,7 @@ class LegwiseTangent:
         mechanism, carrier = machine.mechanism, machine.carrier
         self._ways = ways = mechanism.ways.astype(object)
         size, start = ways.shape[1], carrier.size
-        not_driven = np.zeros((1, len(mechanism.driven)))
-        amounts = np.concatenate([not_driven, mechanism.growth], axis=1)
-        placed = carrier.chain.place(of_scalars(coordinates[:start]), amounts)
+        placed = carrier.chain.place(of_scalars(coordinates[:start]), mechanism.undriven_amounts)
         self.platform = placed.end
         is_free = all(is_zero(coordinate) for coordinate in coordinates)
         self.pulls = [pull_of(rod, None if is_free else self.platform) for rod in machine.rods]

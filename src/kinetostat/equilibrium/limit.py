@@ -22,8 +22,16 @@ from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import Balance, free_state
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.solving import FEW_STEPS, are_near, at_rest, states_near, with_share
-from kinetostat.equilibrium.tangent import Stability, stabilities, stability
+from kinetostat.equilibrium.solving import (
+    FEW_STEPS,
+    Stability,
+    are_near,
+    at_rest,
+    stabilities,
+    stability,
+    states_near,
+    with_share,
+)
 from kinetostat.frozen import dataclass
 from kinetostat.machine.leg import Leg, Line
 from kinetostat.machine.link import Parallelogram

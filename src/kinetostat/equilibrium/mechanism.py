@@ -32,6 +32,44 @@ from kinetostat.numerics.motions import of_scalars
 
 
 @dataclass(frozen=True)
+class LegwisePlaces:
+    """Places in a list of numbers that has the platform first, and then one leg after the other.
+
+    Attributes:
+        twist: places of the platform's twist along its ways.
+        coordinates: places of the coordinates of each leg.
+        wrenches: places of the wrench on each leg, behind its coordinates; none in a list of motions alone.
+        count: length of the list.
+    """
+
+    twist: slice
+    coordinates: tuple[slice, ...]
+    wrenches: tuple[slice, ...]
+    count: int
+
+    @property
+    def motions(self) -> Integers:
+        """Places of the twist and of all coordinates, in the order of a list of motions alone."""
+        return np.concatenate([np.arange(part.start, part.stop) for part in (self.twist, *self.coordinates)])
+
+    @property
+    def all_wrenches(self) -> Integers:
+        """Places of the wrenches on all legs."""
+        return np.setdiff1d(np.arange(self.count), self.motions)
+
+
+def _legwise_places(ways: int, sizes: Sequence[int], wrench_size: int) -> LegwisePlaces:
+    """Number the platform's ways, and then of each leg its coordinates and the components of its wrench."""
+    end = ways
+    coordinates, wrenches = [], []
+    for size in sizes:
+        coordinates.append(slice(end, end + size))
+        wrenches.append(slice(end + size, end + size + wrench_size))
+        end += size + wrench_size
+    return LegwisePlaces(slice(0, ways), tuple(coordinates), tuple(wrenches), end)
+
+
+@dataclass(frozen=True)
 class Mechanism:
     """A machine at n poses, in units of its own.
 
@@ -83,17 +121,29 @@ class Mechanism:
         """The legs, those of one form together."""
         return like_legs(self.legs)
 
-    @property
-    def starts(self) -> list[int]:
-        """Place among the unknowns of each leg's first coordinate, and the number of all unknowns.
-
-        The twist of the platform comes first, and then, leg by leg, its coordinates and its wrench.
-        """
+    @cached_property
+    def unknown_places(self) -> LegwisePlaces:
+        """Places among the unknowns of the equations of equilibrium: of the twist, all coordinates and all wrenches."""
         ways = self.ways.shape[1]
-        starts = [ways]
-        for leg in self.legs:
-            starts.append(starts[-1] + leg.size + ways)
-        return starts
+        return _legwise_places(ways, [leg.size for leg in self.legs], wrench_size=ways)
+
+    @cached_property
+    def motion_places(self) -> LegwisePlaces:
+        """Places in a small motion: of the twist and all coordinates."""
+        return _legwise_places(self.ways.shape[1], [leg.size for leg in self.legs], wrench_size=0)
+
+    def given_amounts(self, actuators: Array) -> Array:
+        """Return the amounts by which the motions are driven that no coordinate moves [n x amounts].
+
+        Args:
+            actuators: amounts of all actuators [n x actuators]; the growth of the links follows them.
+        """
+        return np.concatenate([actuators, self.growth], axis=1)
+
+    @property
+    def undriven_amounts(self) -> Array:
+        """The same amounts while the actuators stand where they are."""
+        return self.given_amounts(np.zeros((len(self.length), len(self.driven))))
 
     @property
     def actuators(self) -> tuple[str, ...]:

@@ -10,9 +10,9 @@ import numpy as np
 from kinetostat.algebra.scalar import Scalar, smaller, where
 from kinetostat.arrays import Array, Integers
 from kinetostat.equilibrium.balance import Balance
-from kinetostat.equilibrium.solving import at_rest
+from kinetostat.equilibrium.solving import Stabilities, at_rest, stabilities
 from kinetostat.equilibrium.state import MachineState, actuator_loads_at_rest
-from kinetostat.equilibrium.tangent import Stabilities, compliance, inverse, stabilities
+from kinetostat.equilibrium.tangent import platform_compliance, stiffness_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.limits import load_checks, within
 from kinetostat.kinematics.status import Status
@@ -150,10 +150,10 @@ def loaded_numbers(
     equations, stability = states.equations, states.stability
     if equations is None or stability is None:
         return result, states.status
-    compliances = compliance(equations) * equations.mechanism.compliance_units
+    compliances = platform_compliance(equations) * equations.mechanism.compliance_units
     parts = np.array(state.machine.family.components)
     stiffness = np.full((len(equations.residual), 6), np.nan)
-    stiffness[:, parts] = np.diagonal(inverse(compliances[:, parts[:, None], parts]), axis1=1, axis2=2)
+    stiffness[:, parts] = np.diagonal(stiffness_of(compliances[:, parts[:, None], parts]), axis1=1, axis2=2)
     pairs = zip(equations.mechanism.legs, equations.legs, strict=True)
     slack = np.sum([((leg.sign != 0.0) & (terms.carrying == 0.0)).sum(axis=1) for leg, terms in pairs], axis=0)
     numbers = {

@@ -62,8 +62,7 @@ class Place:
 def place_of(machine: Cut, coordinates: Row) -> Place:
     """Evaluate the equations of a machine whose loops are cut at some coordinates of its carrier."""
     mechanism, carrier = machine.mechanism, machine.carrier
-    row = of_scalars(coordinates)
-    amounts = np.concatenate([np.zeros((1, len(mechanism.actuators))), mechanism.growth], axis=1)
+    row, amounts = of_scalars(coordinates), mechanism.undriven_amounts
     placed = carrier.chain.place(row, amounts)
     platform = placed.end
     grows = any(number >= len(mechanism.actuators) for number in carrier.chain.given)

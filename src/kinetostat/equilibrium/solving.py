@@ -1,6 +1,6 @@
-"""Solve for the state in which a mechanism is at rest: Newton's method, or small steps of the load, or a descent.
+"""States of rest of a mechanism: how they are found, by Newton's method or a descent, and whether they are stable.
 
-Source: theory section 12. Units, axes and origin are those of `mechanism`.
+Source: theory section 12; theory (40) for stability. Units, axes and origin are those of `mechanism`.
 """
 
 from dataclasses import replace
@@ -14,11 +14,19 @@ from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.equilibrium.balance import Balance, State, balance, free_state, motion_of, state_after
 from kinetostat.equilibrium.descent import descent_from
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.tangent import solve, stabilities
+from kinetostat.equilibrium.tangent import (
+    admissible,
+    finite_poses,
+    holds_all,
+    over_motions,
+    solve_at_rest,
+    spring_factor,
+    tangent_matrices,
+)
 from kinetostat.frozen import dataclass
 from kinetostat.numerics.iteration import Steps, largest, newton
 from kinetostat.numerics.motions import logarithm
-from kinetostat.tolerances import AT_REST, ROUND_OFF_AT_REST, ZERO_PIVOT
+from kinetostat.tolerances import AT_REST, ROUND_OFF_AT_REST, UNRESISTED, ZERO_PIVOT
 
 MOST_STEPS_OF_LOAD = 25
 """Number of Newton's steps for one step of the load."""
@@ -195,6 +203,11 @@ def with_share(mechanism: Mechanism, share: float | Array, preload: float | None
     return replace(mechanism, legs=legs, **loads)
 
 
+def newton_step(equations: Balance, loaded: bool = True) -> Array:
+    """Return the step of Newton's method from a state, as a step of the unknowns [n x unknowns]; `loaded` as there."""
+    return solve_at_rest(equations, -equations.residual[:, :, None], loaded)[:, :, 0]
+
+
 def states_near(mechanism: Mechanism, start: State, most_steps: int = MOST_STEPS_OF_LOAD) -> Equilibria:
     """Find the states of rest near given ones by Newton's method, without steps of the load.
 
@@ -207,9 +220,7 @@ def states_near(mechanism: Mechanism, start: State, most_steps: int = MOST_STEPS
 
     def equations(state: State, rows: Integers) -> tuple[Array, Steps]:
         evaluated = balance(mechanism if len(rows) == count else mechanism.at(rows), state)
-        return largest(evaluated.residual), lambda unsolved: solve(evaluated, -evaluated.residual[:, :, None])[
-            unsolved, :, 0
-        ]
+        return largest(evaluated.residual), lambda unsolved: newton_step(evaluated)[unsolved]
 
     # The first step may only find what the legs carry and move nothing, so that one step alone shows nothing.
     end = newton(
@@ -225,3 +236,72 @@ def states_near(mechanism: Mechanism, start: State, most_steps: int = MOST_STEPS
     )
     sure = end.converged & (end.steps <= FEW_STEPS) & (end.longest_step <= LONGEST_STEP)
     return Equilibria(mechanism, end.value, end.converged, sure)
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Whether a state of rest holds, and how much more of its load it could hold.
+
+    Attributes:
+        stable: whether every small disturbance comes back.
+        factor: the factor by which the load may grow until one does not, if wrenches grow in proportion; infinite if
+            none does, NaN where springs alone hold nothing.
+        mode: twist of the platform in that disturbance, at the origin; its largest component is 1 [6].
+        legs: the largest motion of each leg's coordinates in it, of the same scale [legs].
+    """
+
+    stable: bool
+    factor: float
+    mode: Array
+    legs: Array
+
+
+@dataclass(frozen=True)
+class Stabilities:
+    """Stability of n states of rest: the fields of `Stability` as arrays with the poses first."""
+
+    stable: Mask
+    factor: Array
+    mode: Array
+    legs: Array
+
+    def at(self, pose: int) -> Stability:
+        """Return the stability of one of the states."""
+        return Stability(bool(self.stable[pose]), float(self.factor[pose]), self.mode[pose], self.legs[pose])
+
+
+def stability(equations: Balance) -> Stability:
+    """Judge the state of rest at a single pose."""
+    return stabilities(equations).at(0)
+
+
+def stabilities(equations: Balance) -> Stabilities:
+    """Judge n states of rest; what is not finite is not stable."""
+    ways, places = equations.mechanism.ways, equations.mechanism.motion_places
+    elastic, geometric, closing = tangent_matrices(equations)
+    sound = finite_poses(elastic + geometric) & finite_poses(closing)
+    stable: Mask = np.array(sound)
+    factors, modes = np.where(sound, np.inf, np.nan), np.zeros((len(sound), places.count))
+    for part in admissible(equations, closing, np.flatnonzero(sound)):
+        rows, allowed = part.rows, part.motions
+        if not allowed.size:  # nothing can move at all
+            continue
+        stiff, turning = (over_motions(matrix[rows], allowed) for matrix in (elastic, geometric))
+        springs = spring_factor(equations, part)
+        holds = holds_all(springs)
+        whitening = np.linalg.inv(np.where(holds[:, None, None], springs, np.eye(springs.shape[1])))
+        # K_e + factor K_g is singular at factor = 1/share, so that the largest share decides.
+        shares, vectors = np.linalg.eigh(-np.swapaxes(whitening, 1, 2) @ turning @ whitening)
+        # Where springs hold every motion, those much softer than others would be lost in the sum of both matrices.
+        stable[rows] = np.where(holds, shares[:, -1] < 1.0, np.linalg.eigvalsh(stiff + turning)[:, 0] > 0.0)
+        grows = holds & (shares[:, -1] > UNRESISTED)
+        factors[rows] = np.where(grows, 1.0 / np.where(grows, shares[:, -1], 1.0), np.where(holds, np.inf, np.nan))
+        motions = (allowed @ whitening @ vectors[:, :, -1:])[:, :, 0]
+        modes[rows] = np.where(grows[:, None], motions / np.abs(motions).max(axis=1, keepdims=True), 0.0)
+    legs = [np.abs(modes[:, moving]).max(axis=1, initial=0.0) for moving in places.coordinates]
+    return Stabilities(
+        stable=stable,
+        factor=factors,
+        mode=modes[:, places.twist] @ ways.T,
+        legs=np.stack(legs, axis=1) if legs else np.zeros((len(sound), 0)),
+    )

@@ -35,13 +35,13 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import Immutable, ImmutableAnswer
 
 if TYPE_CHECKING:
-    from kinetostat.equilibrium import actuation, balance, solving, tangent
+    from kinetostat.equilibrium import actuation, balance, solving
     from kinetostat.equilibrium import limit as load_limits
     from kinetostat.equilibrium import mechanism as mechanisms
     from kinetostat.equilibrium.balance import Balance
     from kinetostat.equilibrium.limit import LoadLimit, Strut
     from kinetostat.equilibrium.mechanism import Mechanism
-    from kinetostat.equilibrium.tangent import Stability
+    from kinetostat.equilibrium.solving import Stability
     from kinetostat.kinematics import closure
     from kinetostat.numerics import distribution
 else:
@@ -50,7 +50,6 @@ else:
     load_limits = LateModule("kinetostat.equilibrium.limit")
     mechanisms = LateModule("kinetostat.equilibrium.mechanism")
     solving = LateModule("kinetostat.equilibrium.solving")
-    tangent = LateModule("kinetostat.equilibrium.tangent")
     closure = LateModule("kinetostat.kinematics.closure")
     distribution = LateModule("kinetostat.numerics.distribution")
 
@@ -195,7 +194,7 @@ class MachineState(Immutable):
     @cached_property
     def stability(self) -> "Stability | None":
         """Stability of the state of rest, and the factor by which the loads may grow; None without a state of rest."""
-        return None if self.at_rest is None else tangent.stability(self.at_rest)
+        return None if self.at_rest is None else solving.stability(self.at_rest)
 
     @property
     def stands(self) -> bool:

@@ -1,4 +1,4 @@
-"""Small motions about a state: which keep all legs closed, how further loads move it, and whether it holds.
+"""Small motions about a state: those that keep all legs closed, and those that further loads cause.
 
 Rigid parts of several legs often hold the same motion, so that closing conditions repeat each other. Geometry alone
 decides here which ones do: in equations with stiffnesses, soft springs could not be distinguished from round-off. The
@@ -9,12 +9,12 @@ stiffness. Its elastic part is that of the springs at this place; the geometric 
 when their lines of action turn. The moment of the load keeps its axis, which no potential does, and only the symmetric
 part of what it adds is taken. No state is found here.
 
-Source: theory (38), (39) and (40). M. Zefran and V. Kumar, "A geometrical approach to the study of the Cartesian
+Source: theory (38) and (39). M. Zefran and V. Kumar, "A geometrical approach to the study of the Cartesian
 stiffness matrix", J. Mechanical Design 124(1), 2002. Units, axes and origin are those of `mechanism`.
 """
 
 from collections.abc import Iterator
-from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,38 +32,49 @@ from kinetostat.tolerances import (
 )
 
 
-def starts_of(equations: Balance) -> Integers:
-    """Place of each leg's first coordinate among twist and coordinates, without wrenches, and the number of all."""
-    sizes = [leg.size for leg in equations.mechanism.legs]
-    return equations.mechanism.ways.shape[1] + np.cumsum([0, *sizes])
+class TangentMatrices(NamedTuple):
+    """Matrices over small motions: the platform's twist and all coordinates, in `Mechanism.motion_places`, N of them.
 
-
-def tangent_matrices(equations: Balance) -> tuple[Array, Array, Array]:
-    """The matrices of springs, of loads and wrenches that turn, and of closing conditions, for small motions.
-
-    All are over the twist of the platform and all coordinates, N numbers: the first two are [n x N x N], and the third
-    [n x conditions x N], whose product with a small motion is zero if the legs stay closed.
+    Attributes:
+        elastic: stiffness of the springs [n x N x N].
+        geometric: stiffness by loads and wrenches that turn [n x N x N].
+        closing: A, whose product with a small motion is zero if the legs stay closed [n x conditions x N].
     """
-    mechanism, ways, starts = equations.mechanism, equations.mechanism.ways, starts_of(equations)
-    count, size, end = len(equations.residual), ways.shape[1], int(starts[-1])
-    elastic, geometric = np.zeros((2, count, end, end))
-    conditions = np.zeros((count, size * len(mechanism.legs), end))
-    geometric[:, :size, :size] = -ways.T @ equations.load_change @ ways
-    for k, (leg, terms) in enumerate(zip(mechanism.legs, equations.legs, strict=True)):
-        moving, rows = slice(starts[k], starts[k + 1]), slice(size * k, size * (k + 1))
+
+    elastic: Array
+    geometric: Array
+    closing: Array
+
+
+def tangent_matrices(equations: Balance) -> TangentMatrices:
+    """Return the matrices of springs, of loads and wrenches that turn, and of closing conditions."""
+    mechanism, ways, places = equations.mechanism, equations.mechanism.ways, equations.mechanism.motion_places
+    poses, size = len(equations.residual), ways.shape[1]
+    elastic, geometric = np.zeros((2, poses, places.count, places.count))
+    closing = np.zeros((poses, size * len(mechanism.legs), places.count))
+    geometric[:, places.twist, places.twist] = -ways.T @ equations.load_change @ ways
+    for number, (leg, terms, moving) in enumerate(zip(mechanism.legs, equations.legs, places.coordinates, strict=True)):
         springs = terms.carrying[:, :, None] * np.eye(leg.size)
         elastic[:, moving, moving] = springs + leg.idle @ np.swapaxes(leg.idle, 1, 2)
         geometric[:, moving, moving] = terms.geometric
-        conditions[:, rows, moving] = ways.T @ terms.rates
-        conditions[:, rows, :size] = -np.eye(size)
-    return elastic, geometric, conditions
+        conditions = conditions_of_leg(number, size)
+        closing[:, conditions, moving] = ways.T @ terms.rates
+        closing[:, conditions, places.twist] = -np.eye(size)
+    return TangentMatrices(elastic, geometric, closing)
+
+
+def conditions_of_leg(number: int, ways: int) -> slice:
+    """Return the places of a leg's conditions among the closing conditions: one for each way of the platform."""
+    return slice(ways * number, ways * (number + 1))
 
 
 def gaps_of(equations: Balance) -> Array:
-    """The largest gap of each leg's closing equations, rad or in units of the length [n]."""
-    ways = equations.mechanism.ways.shape[1]
-    ends = [equations.residual[:, end - ways : end] for end in equations.mechanism.starts[1:]]
-    return np.asarray(np.abs(np.concatenate(ends, axis=1)).max(axis=1, initial=0.0))
+    """Return the largest gap of each leg's closing equations, rad or in units of the length [n].
+
+    Residuals have the gap of a leg at the places of its wrench.
+    """
+    gaps = equations.residual[:, equations.mechanism.unknown_places.all_wrenches]
+    return np.asarray(np.abs(gaps).max(axis=1, initial=0.0))
 
 
 @dataclass(frozen=True)
@@ -72,17 +83,17 @@ class Admissible:
 
     Attributes:
         rows: numbers of the poses [k].
-        motions: a basis of the admissible motions, as columns [k x coordinates x m].
-        inverse: A+, the inverse of the independent conditions [k x coordinates x conditions]: A A+ b = b for all gaps b
+        motions: a basis of the admissible motions, as columns [k x N x m].
+        closing_inverse: A+, the inverse of the independent conditions [k x N x conditions]: A A+ b = b for all gaps b
             that can be closed.
     """
 
     rows: Integers
     motions: Array
-    inverse: Array
+    closing_inverse: Array
 
 
-def admissible(equations: Balance, conditions: Array, rows: Integers | None = None) -> Iterator[Admissible]:
+def admissible(equations: Balance, closing: Array, rows: Integers | None = None) -> Iterator[Admissible]:
     """Find the admissible motions, in groups of poses with the same number of independent conditions.
 
     If the coordinates of each leg follow from its end, the motions of the platform are a basis, which takes a hundredth
@@ -90,113 +101,216 @@ def admissible(equations: Balance, conditions: Array, rows: Integers | None = No
 
     Args:
         equations: the equations at the states.
-        conditions: their closing conditions A [n x conditions x coordinates].
+        closing: their closing conditions A [n x conditions x N].
         rows: numbers of the poses; those at which the conditions are finite if None.
     """
-    rows = np.flatnonzero(np.isfinite(conditions).all(axis=(1, 2))) if rows is None else rows
-    by_platform = _motions_of_platform(equations, conditions[rows], rows)
+    rows = np.flatnonzero(finite_poses(closing)) if rows is None else rows
+    by_platform = _motions_of_platform(equations, closing[rows], rows)
     if by_platform is not None:
         yield by_platform
         rows = np.setdiff1d(rows, by_platform.rows)
     if not len(rows):
         return
-    left, values, right = np.linalg.svd(conditions[rows])
+    left, sizes, right = np.linalg.svd(closing[rows])
     least = np.maximum(CLOSING_ROUND_OFF, OPEN_BY_STEP * gaps_of(equations)[rows])
-    ranks = (values > least[:, None] * values[:, :1]).sum(axis=1)
+    ranks = (sizes > least[:, None] * sizes[:, :1]).sum(axis=1)
     for rank in np.unique(ranks):
         of_rank = ranks == rank
-        shrink = 1.0 / values[of_rank, None, :rank]
+        shrink = 1.0 / sizes[of_rank, None, :rank]
         inverse = np.swapaxes(right[of_rank, :rank], 1, 2) * shrink @ np.swapaxes(left[of_rank, :, :rank], 1, 2)
         yield Admissible(rows[of_rank], np.swapaxes(right[of_rank, rank:], 1, 2), inverse)
 
 
-def _motions_of_platform(equations: Balance, conditions: Array, rows: Integers) -> Admissible | None:
-    """The motions of the platform with those of the legs that follow; only poses at which legs surely follow it."""
-    size, starts = equations.mechanism.ways.shape[1], starts_of(equations)
+def _motions_of_platform(equations: Balance, closing: Array, rows: Integers) -> Admissible | None:
+    """Return the motions of the platform with those of the legs that follow, at poses at which legs surely follow it.
+
+    None if a leg has fewer or more coordinates than the platform has ways, or does not follow it at one of the poses:
+    all of them are then left to singular values.
+    """
+    size, places = equations.mechanism.ways.shape[1], equations.mechanism.motion_places
     if any(leg.size != size for leg in equations.mechanism.legs):
         return None
-    inverse = np.zeros((len(rows), int(starts[-1]), conditions.shape[1]))
-    for number, (first, last) in enumerate(pairwise(starts)):
-        row = slice(size * number, size * (number + 1))
+    inverse = np.zeros((len(rows), places.count, closing.shape[1]))
+    for number, moving in enumerate(places.coordinates):
+        conditions = conditions_of_leg(number, size)
         try:
-            inverse[:, first:last, row] = np.linalg.inv(conditions[:, row, first:last])
+            inverse[:, moving, conditions] = np.linalg.inv(closing[:, conditions, moving])
         except np.linalg.LinAlgError:
             return None
-    motions = -inverse @ conditions[:, :, :size]
-    motions[:, :size] = np.eye(size)
+    motions = -inverse @ closing[:, :, places.twist]
+    motions[:, places.twist] = np.eye(size)
     sure = np.abs(inverse).max(axis=(1, 2), initial=0.0) * DEPENDENT < 1.0
     return Admissible(rows[sure], motions[sure], inverse[sure])
 
 
 def over_motions(matrix: Array, allowed: Array) -> Array:
-    """The symmetric part of Z^T M Z, which is the matrix M over the motions in the columns of Z [n x k x k]."""
+    """Return the symmetric part of Z^T M Z, the matrix M over the motions in the columns of Z [n x k x k]."""
     return np.asarray(0.5 * np.swapaxes(allowed, 1, 2) @ (matrix + np.swapaxes(matrix, 1, 2)) @ allowed)
 
 
-def solve_over_admissible(equations: Balance, right: Array, loaded: bool) -> Array:
-    """Solve the linear equations at a state over the admissible motions, for right sides [n x unknowns x k].
+def solve_at_rest(equations: Balance, right: Array, loaded: bool = True) -> Array:
+    """Solve the linear equations at a state for right sides [n x unknowns x k].
 
-    Twist and coordinates are x = A+ b + Z y, where Z^T H Z y balances the remaining forces. Springs enter by the
-    triangular factor of diag(sqrt k) Z, the stiffest first, and not by Z^T H Z, so that contrasts of stiffness cost
-    half as many digits. If wrenches of legs are not determined, those of least norm are taken. The result is NaN where
-    the equations are not finite.
+    Each leg is eliminated by itself, so that it is a stiffness to the platform. A leg of rigid parts alone has no
+    finite stiffness, and a very stiff one drowns the digits of a soft one. Poses with such a leg, and no others, are
+    solved over the motions that keep all legs closed.
 
     Args:
         equations: the equations at the state.
-        right: right sides, in the order of the unknowns.
-        loaded: whether loads and wrenches that turn count.
+        right: right sides.
+        loaded: whether to count what loads and wrenches do by turning.
+
+    Returns:
+        The unknowns [n x unknowns x k]; NaN where the equations are not finite.
     """
-    elastic, geometric, conditions = tangent_matrices(equations)
+    legs, rigid = _eliminated_legs(equations, right, loaded)
+    if rigid.all():
+        return solve_over_admissible(equations, right, loaded)
+    platform_stiffness, load = equations.platform_rates(loaded), right[:, equations.mechanism.unknown_places.twist]
+    stiffest = np.zeros(len(right))
+    for leg in legs:
+        stiffest = np.maximum(stiffest, np.abs(leg.stiffness).max(axis=(1, 2)))
+        platform_stiffness, load = platform_stiffness + leg.stiffness, load - leg.wrench
+    twist = finite_solution(platform_stiffness, load)
+    result = np.concatenate([twist, *(leg.by_right + leg.by_twist @ twist for leg in legs)], axis=1)
+    sound = np.flatnonzero(finite_poses(platform_stiffness))
+    softest = np.linalg.svd(platform_stiffness[sound], compute_uv=False)[:, -1]
+    rigid[sound] |= stiffest[sound] > STIFFEST_LEG * softest
+    rows = np.flatnonzero(rigid)
+    if len(rows):
+        equations_of_rows = balance(equations.mechanism.at(rows), equations.state.at(rows))
+        result[rows] = solve_over_admissible(equations_of_rows, right[rows], loaded)
+    return result
+
+
+class EliminatedLeg(NamedTuple):
+    """The unknowns of a leg, its coordinates and then its wrench, by the right sides and by the platform's twist.
+
+    Attributes:
+        by_right: the unknowns that the right sides cause while the platform stands still [n x unknowns x k].
+        by_twist: the unknowns per unit of the platform's twist [n x unknowns x ways].
+    """
+
+    by_right: Array
+    by_twist: Array
+
+    @property
+    def wrench(self) -> Array:
+        """The wrench that the right sides cause while the platform stands still [n x ways x k]."""
+        return self.by_right[:, -self.by_twist.shape[2] :]
+
+    @property
+    def stiffness(self) -> Array:
+        """Its stiffness to the platform, the wrench per unit of the twist [n x ways x ways]."""
+        return self.by_twist[:, -self.by_twist.shape[2] :]
+
+
+def _eliminated_legs(equations: Balance, right: Array, loaded: bool) -> tuple[list[EliminatedLeg], Mask]:
+    """Eliminate all legs, and tell at which poses one of them is rigid, or nearly so [n]: there they mean nothing.
+
+    Where all poses have a rigid leg, the legs after it are left out.
+    """
+    size, places = equations.mechanism.ways.shape[1], equations.mechanism.unknown_places
+    legs: list[EliminatedLeg] = []
+    rigid = np.zeros(len(right), dtype=bool)
+    for number, (coordinates, wrench) in enumerate(zip(places.coordinates, places.wrenches, strict=True)):
+        by_platform = np.zeros((len(right), wrench.stop - coordinates.start, size))
+        by_platform[:, -size:] = np.eye(size)
+        sides = np.concatenate([right[:, coordinates.start : wrench.stop], by_platform], axis=2)
+        unknowns, is_regular = _solutions_where_regular(equations.leg_rates(number, loaded), sides)
+        legs.append(EliminatedLeg(unknowns[:, :, :-size], unknowns[:, :, -size:]))
+        rigid |= ~is_regular | (np.abs(legs[-1].stiffness) >= STIFFEST_LEG).any(axis=(1, 2))
+        if rigid.all():
+            break
+    return legs, rigid
+
+
+def _solutions_where_regular(matrices: Array, right: Array) -> tuple[Array, Mask]:
+    """Solve linear equations for n poses, NaN where a matrix is singular, and tell where it is not [n].
+
+    LAPACK refuses a whole stack of which one matrix has a pivot of exactly zero; a determinant has the same pivots.
+    """
+    try:
+        return np.linalg.solve(matrices, right), np.ones(len(matrices), dtype=bool)
+    except np.linalg.LinAlgError:
+        is_regular = np.asarray(np.linalg.slogdet(matrices).sign != 0.0)
+        result = np.full(right.shape, np.nan)
+        result[is_regular] = np.linalg.solve(matrices[is_regular], right[is_regular])
+        return result, is_regular
+
+
+def finite_solution(matrices: Array, right: Array) -> Array:
+    """Solve linear equations for n poses [n x size x k]; NaN where they are not finite.
+
+    Equations that are singular are solved by least squares, which gives the solution of least norm.
+    """
+    sound = finite_poses(matrices) & finite_poses(right)
+    result = np.full((*matrices.shape[:2], right.shape[2]), np.nan)
+    result[sound], is_regular = _solutions_where_regular(matrices[sound], right[sound])
+    for row in np.flatnonzero(sound)[~is_regular]:
+        result[row] = np.linalg.lstsq(matrices[row], right[row], rcond=None)[0]
+    return result
+
+
+def finite_poses(matrices: Array) -> Mask:
+    """Tell at which of n poses a matrix has finite entries alone; it has none where legs cannot be placed."""
+    return np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
+
+
+def solve_over_admissible(equations: Balance, right: Array, loaded: bool) -> Array:
+    """Solve the linear equations at a state over the admissible motions; arguments and result as of `solve_at_rest`.
+
+    Twist and coordinates are x = A+ b + Z y, where Z^T H Z y balances the remaining forces. Springs enter by the
+    triangular factor of diag(sqrt k) Z, the stiffest first, and not by Z^T H Z, so that contrasts of stiffness cost
+    half as many digits. If wrenches of legs are not determined, those of least norm are taken.
+    """
+    elastic, geometric, closing = tangent_matrices(equations)
     geometric = geometric if loaded else np.zeros_like(geometric)
-    moving, carried = places_of(equations)
+    places = equations.mechanism.unknown_places
+    moving, carried = places.motions, places.all_wrenches
     force, gap = right[:, moving], right[:, carried]
-    sound = [np.isfinite(part).all(axis=(1, 2)) for part in (elastic, geometric, conditions, right)]
+    sound = np.flatnonzero(np.all([finite_poses(part) for part in (elastic, geometric, closing, right)], axis=0))
     result = np.full_like(right, np.nan)
-    for part in admissible(equations, conditions, np.flatnonzero(np.all(sound, axis=0))):
+    for part in admissible(equations, closing, sound):
         tangent = elastic[part.rows] + geometric[part.rows]
-        motion = part.inverse @ gap[part.rows]
+        motion = part.closing_inverse @ gap[part.rows]
         transposed = np.swapaxes(part.motions, 1, 2)
         if part.motions.shape[2]:
             remaining = transposed @ (force[part.rows] - tangent @ motion)
             turning = transposed @ geometric[part.rows] @ part.motions
             motion = motion + part.motions @ _balanced_motion(spring_factor(equations, part), turning, remaining)
-        wrenches = np.swapaxes(part.inverse, 1, 2) @ (tangent @ motion - force[part.rows])
+        wrenches = np.swapaxes(part.closing_inverse, 1, 2) @ (tangent @ motion - force[part.rows])
         result[part.rows[:, None], moving], result[part.rows[:, None], carried] = motion, wrenches
     return result
 
 
-def places_of(equations: Balance) -> tuple[Integers, Integers]:
-    """The places of the twist and all coordinates among the unknowns, and those of the wrenches of the legs."""
-    ways, starts = equations.mechanism.ways.shape[1], equations.mechanism.starts
-    places = np.arange(starts[-1])
-    carried = np.concatenate([places[end - ways : end] for end in starts[1:]])
-    return np.setdiff1d(places, carried), carried
-
-
 def spring_factor(equations: Balance, part: Admissible) -> Array:
-    """Upper triangular R, for which R^T R is the stiffness of the springs over the admissible motions [k x m x m]."""
-    size = equations.mechanism.ways.shape[1]
-    stiff = [terms.carrying[part.rows] for terms in equations.legs]
-    roots = np.sqrt(np.concatenate(stiff, axis=1)) if stiff else np.zeros((len(part.rows), 0))
-    stretched = roots[:, :, None] * part.motions[:, size:]
+    """Return the upper triangular R [k x m x m]: R^T R is the stiffness of the springs over the admissible motions.
+
+    Idle motions of legs count as springs, as in `TangentMatrices.elastic`.
+    """
+    places = equations.mechanism.motion_places
+    stiffnesses = [terms.carrying[part.rows] for terms in equations.legs]
+    roots = np.sqrt(np.concatenate(stiffnesses, axis=1)) if stiffnesses else np.zeros((len(part.rows), 0))
+    stretched = roots[:, :, None] * part.motions[:, places.twist.stop :]
     # Householder's reflections keep the digits of small rows below large ones, and lose them above.
     order = np.argsort(-roots, axis=1, kind="stable")
-    rows = [np.take_along_axis(stretched, order[:, :, None], axis=1)]
-    for leg, (first, last) in zip(equations.mechanism.legs, pairwise(starts_of(equations)), strict=True):
-        rows.append(np.swapaxes(leg.idle[part.rows], 1, 2) @ part.motions[:, first:last])
-    missing = part.motions.shape[2] - sum(row.shape[1] for row in rows)
-    rows.append(np.zeros((len(part.rows), max(missing, 0), part.motions.shape[2])))
-    return np.asarray(np.linalg.qr(np.concatenate(rows, axis=1), mode="r"))
+    blocks = [np.take_along_axis(stretched, order[:, :, None], axis=1)]
+    for leg, moving in zip(equations.mechanism.legs, places.coordinates, strict=True):
+        blocks.append(np.swapaxes(leg.idle[part.rows], 1, 2) @ part.motions[:, moving])
+    missing = part.motions.shape[2] - sum(block.shape[1] for block in blocks)
+    blocks.append(np.zeros((len(part.rows), max(missing, 0), part.motions.shape[2])))
+    return np.asarray(np.linalg.qr(np.concatenate(blocks, axis=1), mode="r"))
 
 
 def holds_all(springs: Array) -> Mask:
-    """Whether springs, given by their triangular factor R [k x m x m], hold every admissible motion [k]."""
+    """Tell whether springs, given by their triangular factor R [k x m x m], hold every admissible motion [k]."""
     sizes = np.abs(np.diagonal(springs, axis1=1, axis2=2))
     return np.asarray(sizes.min(axis=1) > UNRESISTED * sizes.max(axis=1))
 
 
 def _balanced_motion(springs: Array, turning: Array, force: Array) -> Array:
-    """The motions y with (R^T R + G) y = f: by R if springs hold every motion, else by the sum as one matrix."""
+    """Return the motions y with (R^T R + G) y = f: by R if springs hold every motion, else by the sum as one matrix."""
     holds = holds_all(springs)
     result = np.zeros_like(force)
     if holds.any():
@@ -210,76 +324,8 @@ def _balanced_motion(springs: Array, turning: Array, force: Array) -> Array:
     return result
 
 
-def finite_solution(rates: Array, right: Array) -> Array:
-    """Solutions of linear equations; NaN where these are not finite, as at poses at which legs cannot be placed."""
-    sound = np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(right).all(axis=(1, 2))
-    result = np.full((*rates.shape[:2], right.shape[2]), np.nan)
-    try:
-        result[sound] = np.linalg.solve(rates[sound], right[sound])
-    except np.linalg.LinAlgError:
-        for row in np.flatnonzero(sound):
-            result[row] = np.linalg.lstsq(rates[row], right[row], rcond=None)[0]
-    return result
-
-
-def solve(equations: Balance, right: Array, loaded: bool = True) -> Array:
-    """Solve the linear equations at a state for right sides [n x unknowns x k].
-
-    Each leg is eliminated by itself, so that it is a stiffness to the platform. A leg made only of rigid parts has
-    no finite stiffness: where one has none at any of the poses, all of them are solved over the motions that keep all
-    legs closed. A very stiff leg drowns the digits of a soft one; poses with such a leg are solved so one by one.
-
-    Args:
-        equations: the equations at the state.
-        right: right sides.
-        loaded: whether to count what loads and wrenches do by turning.
-    """
-    size = equations.mechanism.ways.shape[1]
-    legs = _eliminated_legs(equations, right, loaded)
-    if legs is None:
-        return solve_over_admissible(equations, right, loaded)
-    platform_stiffness, load = equations.platform_rates(loaded), right[:, :size]
-    stiffest = np.zeros(len(right))
-    for leg in legs:
-        stiffness = leg[:, -size:, -size:]
-        stiffest = np.maximum(stiffest, np.abs(stiffness).max(axis=(1, 2)))
-        platform_stiffness, load = platform_stiffness + stiffness, load - leg[:, -size:, :-size]
-    twist = finite_solution(platform_stiffness, load)
-    result = np.concatenate([twist, *(leg[:, :, :-size] + leg[:, :, -size:] @ twist for leg in legs)], axis=1)
-    sound = np.flatnonzero(np.isfinite(platform_stiffness).all(axis=(1, 2)))
-    softest = np.linalg.svd(platform_stiffness[sound], compute_uv=False)[:, -1]
-    rows = sound[stiffest[sound] > STIFFEST_LEG * softest]
-    if len(rows):
-        equations_of_rows = balance(equations.mechanism.at(rows), equations.state.at(rows))
-        result[rows] = solve_over_admissible(equations_of_rows, right[rows], loaded)
-    return result
-
-
-def _eliminated_legs(equations: Balance, right: Array, loaded: bool) -> list[Array] | None:
-    """The unknowns of each leg by the right sides and by the platform's twist; None if a leg is rigid, or nearly so.
-
-    Returns:
-        For each leg, a column for each right side and then one for each way of the platform [n x unknowns of the leg x
-        (k + ways)]. The last rows are the wrench of the leg, so that the last block is its stiffness to the platform.
-    """
-    size, legs = equations.mechanism.ways.shape[1], []
-    for number, (start, end) in enumerate(pairwise(equations.mechanism.starts)):
-        by_platform = np.zeros((len(right), end - start, size))
-        by_platform[:, -size:] = np.eye(size)
-        try:
-            leg = np.linalg.solve(
-                equations.leg_rates(number, loaded), np.concatenate([right[:, start:end], by_platform], axis=2)
-            )
-        except np.linalg.LinAlgError:
-            return None
-        if not (np.abs(leg[:, -size:, -size:]) < STIFFEST_LEG).all():
-            return None
-        legs.append(leg)
-    return legs
-
-
-def compliance(equations: Balance) -> Array:
-    """The twist of the platform per unit of a further wrench, at the loaded tool point [n x 6 x 6].
+def platform_compliance(equations: Balance) -> Array:
+    """Return the twist of the platform per unit of a further wrench, at the loaded tool point [n x 6 x 6].
 
     Rows and columns of components that rigid parts hold are exactly 0, as in `assembly.without_round_off`.
     """
@@ -287,7 +333,7 @@ def compliance(equations: Balance) -> Array:
     size = ways.shape[1]
     right = np.zeros((len(equations.residual), equations.residual.shape[1], size))
     right[:, :size] = np.eye(size)
-    twists = ways @ solve(equations, right)[:, :size] @ ways.T
+    twists = ways @ solve_at_rest(equations, right)[:, :size] @ ways.T
     shift = _shift(-skew_of(equations.state.platform.translation))
     twists = shift @ twists @ np.swapaxes(shift, 1, 2)
     twists = 0.5 * (twists + np.swapaxes(twists, 1, 2))
@@ -298,14 +344,14 @@ def compliance(equations: Balance) -> Array:
 
 
 def _shift(lever: Array) -> Array:
-    """The matrices [n x 6 x 6] that take twists to another reference point: `lever` times the rotation is added."""
+    """Return matrices [n x 6 x 6] that take twists to another reference point: `lever` times the rotation is added."""
     result = np.broadcast_to(np.eye(6), (len(lever), 6, 6)).copy()
     result[:, 3:, :3] = lever
     return result
 
 
-def inverse(compliances: Array) -> Array:
-    """The stiffness of each compliance [n x m x m].
+def stiffness_of(compliances: Array) -> Array:
+    """Return the stiffness of each compliance [n x m x m].
 
     Rigid parts that hold single components leave the others a stiffness of their own: the diagonal entry of a fixed
     component is infinite, its coupling entries are 0. All of it is infinite where other directions are rigid.
@@ -321,13 +367,13 @@ def inverse(compliances: Array) -> Array:
 
 
 def _with_fixed_components(stiffness: Array, fixed: Mask) -> Array:
-    """A stiffness with infinite entries between components that are fixed, and 0 between these and the others."""
+    """Return a stiffness with infinite entries between fixed components, and 0 between these and the others."""
     either, both = fixed[:, :, None] | fixed[:, None], fixed[:, :, None] & fixed[:, None]
     return np.where(both, np.inf, np.where(either & np.isfinite(stiffness), 0.0, stiffness))
 
 
 def elastic_stiffness(equations: Balance, compliances: Array) -> Array:
-    """The stiffness of the springs where they are, leg by leg, at the loaded tool point [n x 6 x 6].
+    """Return the stiffness of the springs where they are, leg by leg, at the loaded tool point [n x 6 x 6].
 
     A leg with rigid parts only lets the platform move in some ways and takes no part in them. Where these are single
     components, the entries of the others are infinite; else all of them are.
@@ -338,85 +384,18 @@ def elastic_stiffness(equations: Balance, compliances: Array) -> Array:
     """
     ways = equations.mechanism.ways
     size = ways.shape[1]
-    total = np.zeros((len(equations.residual), size, size))
-    rigid = np.zeros(len(total), dtype=bool)
+    sum_of_legs = np.zeros((len(equations.residual), size, size))
+    rigid = np.zeros(len(sum_of_legs), dtype=bool)
     for number, leg in enumerate(equations.mechanism.legs):
-        leg_equations = equations.leg_rates(number, loaded=False)
-        rigid |= np.linalg.cond(leg_equations) >= 1.0 / UNRESISTED
+        rates = equations.leg_rates(number, loaded=False)
+        rigid |= np.linalg.cond(rates) >= 1.0 / UNRESISTED
         # Wrenches that no joint feels make these singular: the pseudo-inverse leaves out what rigid parts hold.
-        total += np.linalg.pinv(leg_equations)[:, leg.size :, leg.size :]
+        sum_of_legs += np.linalg.pinv(rates)[:, leg.size :, leg.size :]
     from_tool = _shift(skew_of(equations.state.platform.translation))
-    stiffness = np.swapaxes(from_tool, 1, 2) @ ways @ total @ ways.T @ from_tool
+    stiffness = np.swapaxes(from_tool, 1, 2) @ ways @ sum_of_legs @ ways.T @ from_tool
     stiffness = 0.5 * (stiffness + np.swapaxes(stiffness, 1, 2))
     exists = np.abs(ways).max(axis=1) > 0.0
     fixed = (np.diagonal(compliances, axis1=1, axis2=2) == 0.0) & exists
-    separable = np.isfinite(inverse(compliances[:, exists][:, :, exists])).any(axis=(1, 2))
+    separable = np.isfinite(stiffness_of(compliances[:, exists][:, :, exists])).any(axis=(1, 2))
     result = np.where((rigid & ~separable)[:, None, None], np.inf, stiffness)
     return _with_fixed_components(result, fixed & rigid[:, None])
-
-
-@dataclass(frozen=True)
-class Stability:
-    """Whether a state of rest holds, and how much more of its load it could hold.
-
-    Attributes:
-        stable: whether every small disturbance comes back.
-        factor: the factor by which the load may grow until one does not, if wrenches grow in proportion; infinite if
-            none does, NaN where springs alone hold nothing.
-        mode: twist of the platform in that disturbance, at the origin; its largest component is 1 [6].
-        legs: the largest motion of each leg's coordinates in it, of the same scale.
-    """
-
-    stable: bool
-    factor: float
-    mode: Array
-    legs: Array
-
-
-@dataclass(frozen=True)
-class Stabilities:
-    """Stability of n states of rest: the fields of `Stability` as arrays with the poses first."""
-
-    stable: Mask
-    factor: Array
-    mode: Array
-    legs: Array
-
-
-def stability(equations: Balance) -> Stability:
-    """Judge the state of rest at a single pose."""
-    judged = stabilities(equations)
-    return Stability(bool(judged.stable[0]), float(judged.factor[0]), judged.mode[0], judged.legs[0])
-
-
-def stabilities(equations: Balance) -> Stabilities:
-    """Judge n states of rest; what is not finite is not stable."""
-    ways, starts = equations.mechanism.ways, starts_of(equations)
-    elastic, geometric, conditions = tangent_matrices(equations)
-    count, size = len(elastic), ways.shape[1]
-    sound = np.isfinite(elastic + geometric).all(axis=(1, 2)) & np.isfinite(conditions).all(axis=(1, 2))
-    stable: Mask = np.array(sound)
-    factors, modes = np.where(sound, np.inf, np.nan), np.zeros((count, starts[-1]))
-    for part in admissible(equations, conditions, np.flatnonzero(sound)):
-        rows, allowed = part.rows, part.motions
-        if not allowed.size:  # nothing can move at all
-            continue
-        stiff, turning = (over_motions(matrix[rows], allowed) for matrix in (elastic, geometric))
-        springs = spring_factor(equations, part)
-        holds = holds_all(springs)
-        whitening = np.linalg.inv(np.where(holds[:, None, None], springs, np.eye(springs.shape[1])))
-        # K_e + factor K_g is singular at factor = 1/share, so that the largest share decides.
-        shares, vectors = np.linalg.eigh(-np.swapaxes(whitening, 1, 2) @ turning @ whitening)
-        # Where springs hold every motion, those much softer than others would be lost in the sum of both matrices.
-        stable[rows] = np.where(holds, shares[:, -1] < 1.0, np.linalg.eigvalsh(stiff + turning)[:, 0] > 0.0)
-        grows = holds & (shares[:, -1] > UNRESISTED)
-        factors[rows] = np.where(grows, 1.0 / np.where(grows, shares[:, -1], 1.0), np.where(holds, np.inf, np.nan))
-        motions = (allowed @ whitening @ vectors[:, :, -1:])[:, :, 0]
-        modes[rows] = np.where(grows[:, None], motions / np.abs(motions).max(axis=1, keepdims=True), 0.0)
-    legs = [np.abs(modes[:, a:b]).max(axis=1, initial=0.0) for a, b in pairwise(starts)]
-    return Stabilities(
-        stable=stable,
-        factor=factors,
-        mode=modes[:, :size] @ ways.T,
-        legs=np.stack(legs, axis=1) if legs else np.zeros((count, 0)),
-    )

@@ -17,8 +17,8 @@ from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.engine.batch import Progress, first_limit_passed, silent
 from kinetostat.engine.loaded import Way
 from kinetostat.equilibrium.actuation import commanded_state
+from kinetostat.equilibrium.solving import stabilities
 from kinetostat.equilibrium.state import WITHOUT_SEARCH_FOR_REST, MachineState, state_of, states_at
-from kinetostat.equilibrium.tangent import stabilities
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.closing import Joints, pose_coordinates
 from kinetostat.kinematics.forward import leg_names

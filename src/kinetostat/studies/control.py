@@ -251,7 +251,7 @@ def state_space(
     input_ports, input_modes = _ports(solution, forces, ("N·m", "N"), "input", inputs)
     motions = {part: part for part in vibration.components}
     output_ports, output_modes = _ports(solution, motions, ("rad", "m"), "output", outputs)
-    kept = solution.ringing if count is None else min(count, solution.ringing)
+    kept = solution.mode_count if count is None else min(count, solution.mode_count)
     return StateSpace(
         machine=machine,
         equations=equations_of(solution, damping, input_modes, output_modes, kept),

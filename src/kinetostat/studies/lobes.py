@@ -149,7 +149,7 @@ class _VibrationAtPose:
 
     def borders(self, engagement: Engagement) -> Borders | None:
         """The borders of stability at the pose; None where nothing vibrates."""
-        if self.vibration.solution is None or not self.vibration.solution.ringing:
+        if self.vibration.solution is None or not self.vibration.solution.mode_count:
             return None
         frequencies = self.vibration.search_frequencies
         displacements = self.vibration.receptance(frequencies.tolist())[:, 3:, 3:]

@@ -87,10 +87,10 @@ def modes_along(state: MachineState, form: RigidForm, motion: Motion, wrench: Ar
         answer = modes(machine)
     except InputError:  # nothing has a mass, or no spring deflects
         return None
-    if answer.solution is None or answer.damping is None or not answer.solution.ringing or motion.timeless:
+    if answer.solution is None or answer.damping is None or not answer.solution.mode_count or motion.timeless:
         return None
     solution, ratios = answer.solution, answer.damping.ratios(answer.solution)
-    shapes, rates = solution.tool[:, : solution.ringing], 2.0 * np.pi * solution.frequencies
+    shapes, rates = solution.tool[:, : solution.mode_count], 2.0 * np.pi * solution.frequencies
     displacements = np.linalg.norm(shapes[3:], axis=0)
     times = np.linspace(motion.times[0], motion.times[-1], STEPS + 1)
     loads = shapes.T @ np.array([np.interp(times, motion.times, row) for row in wrench])

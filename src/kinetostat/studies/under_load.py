@@ -18,9 +18,9 @@ from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import Balance, balance, free_state, loaded_links
 from kinetostat.equilibrium.limit import LoadLimit, Strut
 from kinetostat.equilibrium.mechanism import Mechanism
-from kinetostat.equilibrium.solving import Rest, at_rest, with_share
+from kinetostat.equilibrium.solving import Rest, Stability, at_rest, newton_step, with_share
 from kinetostat.equilibrium.state import AnswerInState, MachineState, state_of
-from kinetostat.equilibrium.tangent import Stability, compliance, elastic_stiffness, inverse, solve
+from kinetostat.equilibrium.tangent import elastic_stiffness, platform_compliance, stiffness_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.limits import Check, limit_use, load_checks, why_beyond, within
 from kinetostat.kinematics.mobility import describe
@@ -249,7 +249,7 @@ def _answer_at_rest(state: MachineState, equations: Balance, stability: Stabilit
     machine, response = state.machine, state.free
     mechanism, parts = equations.mechanism, list(machine.family.components)
     units, square = mechanism.twist_units[0], np.ix_(parts, parts)
-    all_compliances = compliance(equations)
+    all_compliances = platform_compliance(equations)
     compliances = (all_compliances * mechanism.compliance_units)[0][square]
     springs_alone = (elastic_stiffness(equations, all_compliances) / mechanism.compliance_units)[0][square]
     checks = _limits_at_rest(state)
@@ -264,7 +264,7 @@ def _answer_at_rest(state: MachineState, equations: Balance, stability: Stabilit
         springs=tuple(_spring_states(equations)),
         slack_legs=_slack_legs(equations),
         elastic=_clean_stiffness(springs_alone),
-        tangent=_clean_stiffness(inverse(compliances[None])[0]),
+        tangent=_clean_stiffness(stiffness_of(compliances[None])[0]),
         compliance=np.array(clean_matrix(compliances.tolist())),
         factor=None if math.isnan(stability.factor) else stability.factor,
         mode=(stability.mode * units)[parts],
@@ -328,9 +328,8 @@ def _linear(response: Response, mechanism: Mechanism, parts: list[int]) -> Array
     rows = np.array(response.compliance.rows(), dtype=float)
     if int(response.status) not in REGULAR or not np.isfinite(rows).all():
         return None
-    start = balance(mechanism, free_state(mechanism))
-    step = solve(start, -start.residual[:, :, None], loaded=False)[0, :, 0]
-    return _in_si(mechanism, mechanism.ways @ step[: mechanism.ways.shape[1]], parts)
+    step = newton_step(balance(mechanism, free_state(mechanism)), loaded=False)[0]
+    return _in_si(mechanism, mechanism.ways @ step[mechanism.unknown_places.twist], parts)
 
 
 def _in_si(mechanism: Mechanism, twist: Array, parts: list[int]) -> Array:

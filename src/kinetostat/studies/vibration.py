@@ -298,7 +298,7 @@ def _modes_with_closed_loops(state: MachineState) -> Vibration:
     loops = servo_loops(state)
     answer = replace(_modes_of(state_of(with_standing_motors(state.machine))), state=state)
     solution = answer.solution
-    if solution is None or answer.damping is None or not solution.ringing:
+    if solution is None or answer.damping is None or not solution.mode_count:
         return answer
     loops_of_drives = tuple(loops[drive.name] for drive in solution.drives)
     return replace(answer, loops=ClosedLoops(solution, answer.damping, loops_of_drives))
@@ -383,12 +383,12 @@ def _motions(components: Sequence[str]) -> str:
 
 
 def _modes(machine: Machine, response: Response, equations: Balance, solution: Modes, damping: Damper) -> list[Mode]:
-    shown = slice(0, min(solution.ringing, MOST_SHOWN))
+    shown = slice(0, min(solution.mode_count, MOST_SHOWN))
     strains, kinetics = strain_shares(equations, solution.shapes[:, shown]), kinetic_shares(equations, solution)
     parts, length = list(machine.family.components), float(response.configuration.length)
     effective, springs = effective_masses(equations, solution), springs_of(response.configuration)
     result = []
-    for k in range(solution.ringing)[shown]:
+    for k in range(solution.mode_count)[shown]:
         omega = 1.0 / math.sqrt(solution.inverse_squares[k])
         twist = solution.tool[:, k] * omega  # of a modal mass of 1 kg
         sizes = np.abs(twist) * np.array([length] * 3 + [1.0] * 3)

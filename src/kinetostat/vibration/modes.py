@@ -17,7 +17,8 @@ import numpy as np
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.elastic_legs import idle_motions
-from kinetostat.equilibrium.tangent import over_motions, starts_of, tangent_matrices
+from kinetostat.equilibrium.mechanism import LegwisePlaces
+from kinetostat.equilibrium.tangent import conditions_of_leg, finite_poses, over_motions, tangent_matrices
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import MODES
 from kinetostat.numerics.motions import skew_of
@@ -62,28 +63,28 @@ class Modes:
     drives: tuple[Drive, ...] = ()
 
     @property
-    def ringing(self) -> int:
+    def mode_count(self) -> int:
         """Number of modes that have mass, and so a frequency."""
         return int((self.inverse_squares > 0.0).sum())
 
     @property
     def frequencies(self) -> Array:
-        """Natural frequencies, Hz [ringing]."""
-        return np.asarray(0.5 / np.pi / np.sqrt(self.inverse_squares[: self.ringing]))
+        """Natural frequencies, Hz [modes]."""
+        return np.asarray(0.5 / np.pi / np.sqrt(self.inverse_squares[: self.mode_count]))
 
 
 def mass_matrix(equations: Balance) -> Array:
     """Return M over the ways of the platform and all coordinates of the legs [n x coordinates x coordinates], s²."""
-    mechanism, starts = equations.mechanism, starts_of(equations)
+    mechanism, state, places = equations.mechanism, equations.state, equations.mechanism.motion_places
     ways, length = mechanism.ways, mechanism.length
-    size = ways.shape[1]
-    result = np.zeros((len(length), starts[-1], starts[-1]))
-    result[:, :size, :size] = ways.T @ platform_inertia(mechanism.platform, equations.state.platform, length) @ ways
-    amounts = np.concatenate([equations.state.amounts, mechanism.growth], axis=1)
-    for number, (leg, (first, last)) in enumerate(zip(mechanism.legs, pairwise(starts), strict=True)):
-        of_leg = result[:, first:last, first:last]
+    result = np.zeros((len(length), places.count, places.count))
+    of_platform = platform_inertia(mechanism.platform, state.platform, length)
+    result[:, places.twist, places.twist] = ways.T @ of_platform @ ways
+    amounts = mechanism.given_amounts(state.amounts)
+    for leg, coordinates, moving in zip(mechanism.legs, state.coordinates, places.coordinates, strict=True):
+        of_leg = result[:, moving, moving]
         if leg.masses.carried:
-            placed = leg.chain.place(equations.state.coordinates[number], amounts)
+            placed = leg.chain.place(coordinates, amounts)
             for _, matrix in mass_matrices(leg.masses, leg_rates(leg, placed), length):
                 of_leg += matrix
         of_leg += _diagonal(leg.rotors * length[:, None])
@@ -96,19 +97,19 @@ def stiffness_matrix(equations: Balance) -> tuple[Array, Array]:
     States of rest are solved for with a spring along each idle motion, which nothing deflects there; in vibrations
     masses would deflect it, so that it is taken away.
     """
-    elastic, geometric, conditions = tangent_matrices(equations)
-    stiff = elastic + geometric
-    for leg, (first, last) in zip(equations.mechanism.legs, pairwise(starts_of(equations)), strict=True):
-        stiff[:, first:last, first:last] -= leg.idle @ np.swapaxes(leg.idle, 1, 2)
-    return stiff, conditions
+    mechanism, matrices = equations.mechanism, tangent_matrices(equations)
+    stiff = matrices.elastic + matrices.geometric
+    for leg, moving in zip(mechanism.legs, mechanism.motion_places.coordinates, strict=True):
+        stiff[:, moving, moving] -= leg.idle @ np.swapaxes(leg.idle, 1, 2)
+    return stiff, matrices.closing
 
 
 def damping_matrix(equations: Balance) -> Array:
     """Return viscous friction of joints and rotors over the same coordinates [n x coordinates x coordinates], s."""
-    mechanism, starts = equations.mechanism, starts_of(equations)
-    result = np.zeros((len(mechanism.length), starts[-1], starts[-1]))
-    for leg, (first, last) in zip(mechanism.legs, pairwise(starts), strict=True):
-        result[:, first:last, first:last] = _diagonal(leg.dampers * mechanism.length[:, None])
+    mechanism, places = equations.mechanism, equations.mechanism.motion_places
+    result = np.zeros((len(mechanism.length), places.count, places.count))
+    for leg, moving in zip(mechanism.legs, places.coordinates, strict=True):
+        result[:, moving, moving] = _diagonal(leg.dampers * mechanism.length[:, None])
     return result
 
 
@@ -140,12 +141,12 @@ def solved_modes(equations: Balance, shaped: bool = True) -> Iterator[ModesOfPos
     """
     stiff, conditions = stiffness_matrix(equations)
     mass = mass_matrix(equations)
-    idle_conditions, starts = motions_left_out(equations, mass), starts_of(equations)
-    sound = np.isfinite(stiff).all(axis=(1, 2)) & np.isfinite(conditions).all(axis=(1, 2))
-    for rows, basis in _allowed_motions(conditions, idle_conditions, starts, np.flatnonzero(sound)):
+    idle_conditions, places = motions_left_out(equations, mass), equations.mechanism.motion_places
+    sound = np.flatnonzero(finite_poses(stiff) & finite_poses(conditions))
+    for rows, basis in _allowed_motions(conditions, idle_conditions, places, sound):
         stiff_within, mass_within, unit_within = (
-            _over_leg_bases(matrix, rows, basis, starts)
-            for matrix in (stiff, mass, np.broadcast_to(np.eye(starts[-1]), mass.shape))
+            _over_leg_bases(matrix, rows, basis, places)
+            for matrix in (stiff, mass, np.broadcast_to(np.eye(places.count), mass.shape))
         )
         holds, factors = _inverse_factors(stiff_within)
         if not holds.any():
@@ -156,7 +157,7 @@ def solved_modes(equations: Balance, shaped: bool = True) -> Iterator[ModesOfPos
             inverse_squares, axes = np.linalg.eigh(scaled_mass)
             shapes = _over_coordinates(transposed @ axes[:, :, ::-1], [part[holds] for part in basis])
         else:
-            inverse_squares, shapes = np.linalg.eigvalsh(scaled_mass), np.zeros((int(holds.sum()), starts[-1], 0))
+            inverse_squares, shapes = np.linalg.eigvalsh(scaled_mass), np.zeros((int(holds.sum()), places.count, 0))
         inverse_squares = inverse_squares[:, ::-1]
         motion_sizes = np.trace(factors @ unit_within[holds] @ transposed, axis1=1, axis2=2)
         round_off = NO_MOMENTUM * np.trace(mass[rows[holds]], axis1=1, axis2=2) * motion_sizes
@@ -166,7 +167,7 @@ def solved_modes(equations: Balance, shaped: bool = True) -> Iterator[ModesOfPos
 
 
 def _allowed_motions(
-    conditions: Array, idle_conditions: Array, starts: Integers, rows: Integers
+    conditions: Array, idle_conditions: Array, places: LegwisePlaces, rows: Integers
 ) -> Iterator[tuple[Integers, list[Array]]]:
     """Give poses with as many motions that obey all conditions, and these motions leg by leg.
 
@@ -176,18 +177,17 @@ def _allowed_motions(
     Args:
         conditions: conditions of closed legs [n x conditions x coordinates].
         idle_conditions: see `motions_left_out`.
-        starts: number of the first coordinate of each leg, and of all coordinates.
+        places: places of the twist and of the coordinates of each leg.
         rows: numbers of the poses at which all is finite.
 
     Returns:
         Numbers of poses, and their motions: those of the platform [k x ways x motions], then those of each leg
         [k x coordinates x motions], of which as many as the platform has come first and follow it.
     """
-    size = int(starts[0])
     legs = []
-    for number, (first, last) in enumerate(pairwise(starts)):
-        idle = idle_conditions[rows, first - size : last - size, first:last]
-        closing = conditions[rows, size * number : size * (number + 1), first:last]
+    for number, moving in enumerate(places.coordinates):
+        idle = idle_conditions[rows, moving, moving]
+        closing = conditions[rows, conditions_of_leg(number, places.twist.stop), moving]
         legs.append(_closed_leg(closing, idle[:, idle.any(axis=(0, 2))]))
     _, sizes, ways = np.linalg.svd(np.concatenate([leg.missed for leg in legs], axis=1), full_matrices=False)
     ranks = np.stack([(sizes > CLOSING_ROUND_OFF).sum(axis=1), *(leg.rank for leg in legs)], axis=1)
@@ -239,8 +239,11 @@ def _closed_leg(closing: Array, idle: Array) -> _ClosedLeg:
     return _ClosedLeg(inverse, missed, rank, right)
 
 
-def _places(basis: Sequence[Array]) -> Iterator[Integers]:
-    """Give the places of the motions of the platform, and then of each leg, among all."""
+def _places_of_motions(basis: Sequence[Array]) -> Iterator[Integers]:
+    """Give the places among all motions of those of the platform, and then of those of each leg.
+
+    Motions of the platform come first, because all legs share them.
+    """
     common = basis[0].shape[2]
     end = common
     yield np.arange(common)
@@ -249,21 +252,20 @@ def _places(basis: Sequence[Array]) -> Iterator[Integers]:
         yield np.concatenate([np.arange(common), np.arange(begin, end)])
 
 
-def _over_leg_bases(matrix: Array, rows: Integers, basis: Sequence[Array], starts: Integers) -> Array:
+def _over_leg_bases(matrix: Array, rows: Integers, basis: Sequence[Array], places: LegwisePlaces) -> Array:
     """Return the symmetric part of a matrix, which couples no coordinates of different legs, over the motions."""
-    places = list(_places(basis))
-    size = 1 + max(place.max(initial=-1) for place in places)
+    motions = list(_places_of_motions(basis))
+    size = 1 + max(place.max(initial=-1) for place in motions)
     result = np.zeros((len(rows), size, size))
-    ends = [0, *starts.tolist()]
-    for part, place, (first, last) in zip(basis, places, pairwise(ends), strict=True):
-        result[:, place[:, None], place] += over_motions(matrix[rows, first:last, first:last], part)
+    for part, motion, moving in zip(basis, motions, (places.twist, *places.coordinates), strict=True):
+        result[:, motion[:, None], motion] += over_motions(matrix[rows, moving, moving], part)
     return result
 
 
 def _over_coordinates(combinations: Array, basis: Sequence[Array]) -> Array:
     """Return combinations of motions as motions of all coordinates [k x coordinates x m]."""
-    pairs = zip(basis, _places(basis), strict=True)
-    return np.concatenate([part @ combinations[:, place] for part, place in pairs], axis=1)
+    pairs = zip(basis, _places_of_motions(basis), strict=True)
+    return np.concatenate([part @ combinations[:, motions] for part, motions in pairs], axis=1)
 
 
 def _inverse_factors(stiff: Array) -> tuple[Mask, Array]:
@@ -279,25 +281,23 @@ def _inverse_factors(stiff: Array) -> tuple[Mask, Array]:
 
 
 def motions_left_out(equations: Balance, mass: Array) -> Array:
-    """Return conditions that leave out motions without a frequency [n x conditions x coordinates].
+    """Return conditions that leave out motions without a frequency [n x coordinates x coordinates].
 
-    Nothing leaves the plane of a planar machine. Motions of a leg that leave the platform where it is and deflect no
-    spring, such as a strut that spins about its own axis, have the frequency 0: all other modes have no momentum with
-    them.
+    The row of a coordinate holds a condition of its leg, or zeros; rows of the platform's twist are zero. Nothing
+    leaves the plane of a planar machine. Motions of a leg that leave the platform where it is and deflect no spring,
+    such as a strut that spins about its own axis, have the frequency 0: all other modes have no momentum with them.
 
     Args:
         equations: equations of the states.
         mass: see `mass_matrix`.
     """
-    starts, ways = starts_of(equations), equations.mechanism.ways
-    result = np.zeros((len(equations.residual), starts[-1] - starts[0], starts[-1]))
-    parts = zip(equations.mechanism.legs, equations.legs, pairwise(starts), strict=True)
-    for leg, terms, (first, last) in parts:
+    mechanism, ways, places = equations.mechanism, equations.mechanism.ways, equations.mechanism.motion_places
+    result = np.zeros((len(equations.residual), places.count, places.count))
+    for leg, terms, moving in zip(mechanism.legs, equations.legs, places.coordinates, strict=True):
         sizes_in_plane, sizes = (np.linalg.norm(part, axis=1) for part in (ways.T @ terms.rates, terms.rates))
         out_of_plane = (sizes_in_plane <= UNRESISTED * sizes)[:, :, None] * np.eye(leg.size)
         idle = idle_motions(terms.rates, leg.springs) if leg.idle.any() else leg.idle
-        of_idle = _without_momentum(idle, mass[:, first:last, first:last])
-        result[:, first - starts[0] : last - starts[0], first:last] = of_idle + out_of_plane
+        result[:, moving, moving] = _without_momentum(idle, mass[:, moving, moving]) + out_of_plane
     return result
 
 
@@ -378,8 +378,8 @@ def _settled_shapes(inverse_squares: Array, shapes: Array, motions: Array, lengt
 def _drives(equations: Balance, shapes: Array) -> Iterator[Drive]:
     mechanism = equations.mechanism
     length, joule = float(mechanism.length[0]), float(mechanism.force[0] * mechanism.length[0])
-    for leg, first in zip(mechanism.legs, starts_of(equations), strict=False):
-        for place, spring in enumerate(leg.springs, first):
+    for leg, places in zip(mechanism.legs, mechanism.motion_places.coordinates, strict=True):
+        for place, spring in enumerate(leg.springs, places.start):
             if spring is not None and spring.actuated:
                 turning = spring.joint.point is not None
                 yield Drive(spring.part_name, turning, shapes[place] * (1.0 if turning else length) / np.sqrt(joule))
@@ -391,6 +391,6 @@ def tool_motions(equations: Balance) -> Array:
     shift = np.eye(6)
     shift[3:, :3] = -skew_of(equations.state.platform.translation)[0]
     joule = float(mechanism.force[0] * mechanism.length[0])
-    result = np.zeros((6, int(starts_of(equations)[-1])))
-    result[:, : ways.shape[1]] = mechanism.twist_units[0][:, None] * (shift @ ways) / np.sqrt(joule)
+    result = np.zeros((6, mechanism.motion_places.count))
+    result[:, mechanism.motion_places.twist] = mechanism.twist_units[0][:, None] * (shift @ ways) / np.sqrt(joule)
     return result

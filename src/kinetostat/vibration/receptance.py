@@ -37,8 +37,8 @@ class Damper:
     ratio: float
 
     def ratios(self, modes: Modes) -> Array:
-        """Damping ratio of each mode with mass, all its damping counted, for light damping [ringing]."""
-        count = modes.ringing
+        """Damping ratio of each mode with mass, all its damping counted, for light damping [modes]."""
+        count = modes.mode_count
         roots = np.sqrt(modes.inverse_squares[:count])  # 1 / omega, s
         return np.asarray(self.ratio + 0.5 * np.diagonal(self.friction)[:count] / roots)
 
@@ -188,7 +188,7 @@ def state_space(
         count: number of the lowest modes that become states; all that have mass if None. The others follow at once,
             without friction, and what they add to the compliance stays in D.
     """
-    with_mass = modes.ringing
+    with_mass = modes.mode_count
     size = with_mass if count is None else min(count, with_mass)
     friction = damping.friction
     creeping, creep, free = _motions_without_mass(friction, with_mass)

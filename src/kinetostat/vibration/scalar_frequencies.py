@@ -172,8 +172,7 @@ def frequencies_of_cut(machine_cut: Cut, coordinates: Row, sloped: bool = False)
 def _matrices_over_carrier(machine_cut: Cut, coordinates: Row) -> tuple[Array, Array]:
     """Return K and M over the coordinates of the carrier of a machine whose loops are all cut at rods."""
     place, mechanism = place_of(machine_cut, coordinates), machine_cut.mechanism
-    amounts = np.concatenate([np.zeros((1, len(mechanism.actuators))), mechanism.growth], axis=1)
-    placed = machine_cut.carrier.chain.place(of_scalars(coordinates), amounts)
+    placed = machine_cut.carrier.chain.place(of_scalars(coordinates), mechanism.undriven_amounts)
     length, twists = mechanism.length, place.terms.rates[0]
     inertia = platform_inertia(mechanism.platform, place.platform, length)[0]
     for rod in machine_cut.rods:
