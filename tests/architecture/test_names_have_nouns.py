@@ -39,7 +39,6 @@ CLASSES_LEFT: frozenset[str] = frozenset(
     {
         "Axis",
         "Body",
-        "DrawnMachine",
         "Element",
         "Field",
         "Kind",

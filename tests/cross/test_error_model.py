@@ -12,9 +12,10 @@ from kinetostat.kinematics.forward import assembly_modes, system_of
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.actuators import actuators_of
-from kinetostat.machine.loading import build
+from kinetostat.machine.loading import build, load
 from kinetostat.machine.machine import springs
 from kinetostat.machine.parameters import parameters, values, with_values
+from kinetostat.spec.errors import InputError
 from machines import load_without_limits, one_of_each
 
 POSES = 6
@@ -81,21 +82,21 @@ def test_rates_at_errors_are_the_derivative_there(case):
 @one_of_each
 def test_no_error_of_a_leg_is_missing_and_none_is_there_twice(case):
     rows = home_rows(case.machine)
-    listed = [s for s in leg_error_sources(rows) if s[0].group != "clearances"]
+    listed = [s for s in leg_error_sources(rows) if s.error.group != "clearances"]
     for number, row in enumerate(rows.legs):
-        mine = [source for source in listed if source[1][0].leg == number]
+        mine = [source for source in listed if source.insertions[0].leg == number]
         if any(unit.kind == "ball" for unit in row.units) or not mine:
             continue  # between the three axes of a ball nothing is made
         everywhere = [
-            (None, (Insertion(number, behind, np.diag([1.0] * 3 + [rows.length] * 3)[way]),))
+            (Insertion(number, behind, np.diag([1.0] * 3 + [rows.length] * 3)[way]),)
             for behind in range(len(row.twists) + 1)
             for way in range(6)
         ]
         # The bars' difference and gains depend on the coordinates, which no constant displacement does.
-        everywhere += [s for s in mine if s[0].path.endswith(("difference", "gain"))]
+        everywhere += [s.insertions for s in mine if s.error.path.endswith(("difference", "gain"))]
         unit = []
-        for sources in (everywhere, mine):
-            columns = effects(row, rows, sources, random_coordinates(row, rows.length))
+        for insertions in (everywhere, [s.insertions for s in mine]):
+            columns = effects(row, rows, insertions, random_coordinates(row, rows.length))
             sizes = np.linalg.norm(columns, axis=0)
             unit.append((columns / sizes)[:, sizes > 1e-9])
         basis, triangle = np.linalg.qr(unit[1])
@@ -216,3 +217,8 @@ def test_compliances_deflect_the_tool_by_their_share_of_the_load():
     compliance = np.array(response.compliance.rows(), dtype=float)
     expected = compliance @ np.array(response.load.components(), dtype=float)
     assert model.deflections(model.drawn.load)[0].sum(axis=1) == pytest.approx(expected)
+
+
+def test_only_the_pose_and_the_loads_of_a_machine_vary():
+    with pytest.raises(InputError, match=r'geometry\.base_radius" is not a coordinate.*vary.*"pose\.x"'):
+        error_model(load("hexapod"), {"geometry.base_radius": np.ones(2)}, 2)

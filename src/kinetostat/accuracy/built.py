@@ -12,8 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from kinetostat.accuracy.closing import coordinates_toward, in_lengths, independent_columns
+from kinetostat.accuracy.errors import compliance_path, name_in_leg
 from kinetostat.accuracy.model import ErrorModel, error_model
-from kinetostat.accuracy.rows import Errors, HomeRows, LegRow
+from kinetostat.accuracy.rows import ErrorScrews, HomeRows, LegRow
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector
 from kinetostat.arrays import Array
@@ -71,7 +72,7 @@ def as_built(machine: Machine, errors: Array, model: ErrorModel | None = None) -
         )
     values = np.asarray(errors, dtype=float)
     configuration, coordinates = _configuration_near(model, values, still(1), None)
-    return AsBuilt(configuration, *_commands(model, values, coordinates))
+    return _with_actuators(model, values, configuration, coordinates)
 
 
 def compliances_as_built(errors: Array, model: ErrorModel) -> Array:
@@ -102,33 +103,33 @@ def _configuration_near(
         drawn: coordinates of the legs there without errors; None to have them found.
     """
     of_actuators = np.array([error.group in ("zeros", "gains") for error in model.errors])
-    link_errors = model.leg_errors(np.where(of_actuators, 0.0, values))
+    link_screws = model.error_screws(np.where(of_actuators, 0.0, values))
     rows, platform = model.rows, target
     coordinates = [
-        drawn[number] if drawn and not errors else coordinates_toward(row, target, rows.length, errors)
-        for number, (row, errors) in enumerate(zip(rows.legs, link_errors, strict=True))
+        drawn[number] if drawn and not screws else coordinates_toward(row, target, rows.length, screws)
+        for number, (row, screws) in enumerate(zip(rows.legs, link_screws, strict=True))
     ]
-    places = _places(rows, coordinates, link_errors)
-    if max(_gap(target, place.end, rows.length) for place in places) > REACHED:
+    chains = _placed_chains(rows, coordinates, link_screws)
+    if max(_gap(target, chain.end, rows.length) for chain in chains) > REACHED:
         # Actuators stand as drawn: the platform goes to where the legs close, and joints follow it.
         platform = model.closed_state(values).platform
         coordinates = [
-            coordinates_toward(row, platform, rows.length, errors)
-            for row, errors in zip(rows.legs, link_errors, strict=True)
+            coordinates_toward(row, platform, rows.length, screws)
+            for row, screws in zip(rows.legs, link_screws, strict=True)
         ]
-        places = _places(rows, coordinates, link_errors)
+        chains = _placed_chains(rows, coordinates, link_screws)
     factors = {e.path: 1.0 + v for e, v in zip(model.errors, values, strict=True) if e.group == "compliances"}
-    parts = zip(rows.configuration.legs, rows.legs, places, link_errors, strict=True)
-    configuration = replace(
-        rows.configuration,
-        platform=_displacement(platform) @ rows.configuration.platform,
-        legs=tuple(_with_compliances(_leg(leg, row, place, errors), factors) for leg, row, place, errors in parts),
-    )
-    return configuration, coordinates
+    legs = [
+        _with_compliances(_leg_as_built(leg, row, chain, screws), factors)
+        for leg, row, chain, screws in zip(rows.configuration.legs, rows.legs, chains, link_screws, strict=True)
+    ]
+    placement = _displacement(platform) @ rows.configuration.platform
+    return replace(rows.configuration, platform=placement, legs=tuple(legs)), coordinates
 
 
-def _places(rows: HomeRows, coordinates: Sequence[Array], errors: Errors) -> list[PlacedChain]:
-    return [row.chain.place(q, errors=e) for row, q, e in zip(rows.legs, coordinates, errors, strict=True)]
+def _placed_chains(rows: HomeRows, coordinates: Sequence[Array], screws: ErrorScrews) -> list[PlacedChain]:
+    legs = zip(rows.legs, coordinates, screws, strict=True)
+    return [row.chain.place(leg_coordinates, errors=leg_screws) for row, leg_coordinates, leg_screws in legs]
 
 
 def model_at_home(machine: Machine) -> ErrorModel:
@@ -155,18 +156,25 @@ def _displacement(motion: Motions) -> Displacement:
     return Displacement(Rotation(*columns), Vector(*motion.translation.T))
 
 
-def _leg(leg: Leg, row: LegRow, place: PlacedChain, errors: dict[int, Array]) -> Leg:
-    """Return a leg with every element displaced by what carries it; joints by the errors before them, too."""
+def _leg_as_built(leg: Leg, row: LegRow, placed: PlacedChain, screws: dict[int, Array]) -> Leg:
+    """Return a leg with every element displaced by what carries it; joints by the errors before them, too.
+
+    Args:
+        leg: the leg as drawn, at its home place.
+        row: the same leg as a row of motions.
+        placed: the row with its errors, at the place where the leg is wanted.
+        screws: the screw motions by its errors, by the number of motions before them.
+    """
     chain: list[Element] = []
-    for element, behind in zip(leg.chain, row.carried, strict=True):
+    for element, behind in zip(leg.chain, row.motions_before, strict=True):
         is_motion = isinstance(element, Spring) and element.actuated and behind < len(row.twists)
         is_joint = isinstance(element, Parallelogram) or element.freedoms or is_motion
-        carrier = _carrier_with_error(place, errors, behind) if is_joint else place.before[behind]
+        carrier = _carrier_with_error(placed, screws, behind) if is_joint else placed.before[behind]
         displaced = element.displaced(_displacement(carrier))
         if isinstance(displaced, Parallelogram) and isinstance(element, Parallelogram):
-            far = _displacement(_carrier_with_error(place, errors, behind + 1)).apply(element.far)
+            far = _displacement(_carrier_with_error(placed, screws, behind + 1)).apply(element.far)
             displaced = replace(displaced, far=far, fixed_normal=None)
-        if isinstance(displaced, Joint) and isinstance(element, Joint) and chain and behind not in errors:
+        if isinstance(displaced, Joint) and isinstance(element, Joint) and chain and behind not in screws:
             displaced = _with_same_centre(leg.chain[len(chain) - 1], chain[-1], element, displaced)
         chain.append(displaced)
     return replace(leg, chain=tuple(chain), lines=(), idle=leg.idle or _idle_freedoms(chain))
@@ -201,10 +209,10 @@ def _with_same_centre(drawn_before: Element, before: Element, drawn: Joint, join
     return replace(joint, point=before.point) if drawn_before.point == drawn.point else joint
 
 
-def _carrier_with_error(place: PlacedChain, errors: dict[int, Array], behind: int) -> Motions:
+def _carrier_with_error(placed: PlacedChain, screws: dict[int, Array], behind: int) -> Motions:
     """Return the displacement of what lies behind so many motions of a leg and the error there."""
-    before = place.before[behind]
-    return before @ exponential(errors[behind]) if behind in errors else before
+    before = placed.before[behind]
+    return before @ exponential(screws[behind]) if behind in screws else before
 
 
 def _with_compliances(leg: Leg, factors: dict[str, float]) -> Leg:
@@ -212,16 +220,18 @@ def _with_compliances(leg: Leg, factors: dict[str, float]) -> Leg:
     chain: list[Element] = []
     for element in leg.chain:
         if isinstance(element, Spring):
-            names = [name.removeprefix(f"{leg.name} ").replace(".", " ") for name in (element.part_name, element.name)]
-            paths = [f"legs.{leg.name}.{name}.compliance" for name in names]
+            titles = (element.part_name, element.name)
+            paths = [compliance_path(leg.name, name_in_leg(title, leg.name)) for title in titles]
             factor = next((factors[path] for path in paths if path in factors), 1.0)
             element = replace(element, stiffness=element.stiffness / factor)
         chain.append(element)
     return replace(leg, chain=tuple(chain))
 
 
-def _commands(model: ErrorModel, values: Array, coordinates: list[Array]) -> tuple[dict[str, float], ...]:
-    """Return coordinates to command there, real coordinates, and the senses of the actuators, each by actuator."""
+def _with_actuators(
+    model: ErrorModel, values: Array, configuration: Configuration, coordinates: list[Array]
+) -> AsBuilt:
+    """Return the machine as built with its actuators: what to command, where they really are, and their senses."""
     value_by_path = {error.path: value for error, value in zip(model.errors, values, strict=True)}
     commands, real_coordinates, senses = {}, {}, {}
     for row, joints in zip(model.rows.legs, coordinates, strict=True):
@@ -232,4 +242,4 @@ def _commands(model: ErrorModel, values: Array, coordinates: list[Array]) -> tup
                 real = unit.drive.home + unit.drive.sense * float(joints[0, unit.drive.coordinate])
                 real_coordinates[name], senses[name] = real, float(unit.drive.sense)
                 commands[name] = (real - zero) / (1.0 + gain)
-    return commands, real_coordinates, senses
+    return AsBuilt(configuration, commands, real_coordinates, senses)

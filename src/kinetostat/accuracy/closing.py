@@ -17,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from kinetostat.accuracy.rows import Errors, HomeRows, LegRow, LikeRows, by_leg, like_rows, random_coordinates
+from kinetostat.accuracy.rows import ErrorScrews, HomeRows, LegRow, LikeRows, by_leg, like_rows, random_coordinates
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import PlacedChain, closing_gap
@@ -141,34 +141,37 @@ class Holding:
     wrenches: tuple[Array, ...]
     shares: tuple[Array, ...]
 
-    def twist(self, number: int, misfits: Array) -> Array:
+    def twist(self, leg: int, misfits: Array) -> Array:
         """Return twists of the tool by displacements of a leg's end [n x k x 6], both at the tool, over the length."""
-        work = misfits @ self.wrenches[number]
-        return np.asarray(work @ np.swapaxes(self.shares[number], 1, 2))
+        work = misfits @ self.wrenches[leg]
+        return np.asarray(work @ np.swapaxes(self.shares[leg], 1, 2))
 
-    def at_origin(self, number: int, tool: Array, length: float) -> Array:
+    def at_origin(self, leg: int, tool: Array, length: float) -> Array:
         """Return the wrenches of a leg, moments about the base origin over forces: work per rad and per m [n x 6 x m].
 
         Args:
-            number: number of the leg.
+            leg: number of the leg.
             tool: the tool point, m [n x 3].
             length: the length over which moments are, m.
         """
-        basis = np.swapaxes(self.wrenches[number], 1, 2)
+        basis = np.swapaxes(self.wrenches[leg], 1, 2)
         forces = basis[..., 3:] / length
         return np.swapaxes(np.concatenate([basis[..., :3] + cross(tool[:, None], forces), forces], axis=2), 1, 2)
 
 
-def free_screws(row: LegRow, rows: HomeRows, place: PlacedChain, points: Array) -> Array:
+def free_screws(row: LegRow, rows: HomeRows, placed: PlacedChain, points: Array) -> Array:
     """Return the screws of what moves freely in a leg, at points, in units of the length [n x 6 x freedoms].
+
+    The free coordinates of the leg come first, in their order. Twists that a planar machine does not have count as free
+    and stand behind them.
 
     Args:
         row: the leg.
-        rows: its machine; twists that a planar one does not have count as free.
-        place: the leg at its places.
+        rows: its machine.
+        placed: the leg at its places.
         points: the points, m [n x 3].
     """
-    free = row.chain.rates(place)[:, :, list(row.free_coordinates)] * _free_units(row, rows.length)
+    free = row.chain.rates(placed)[:, :, list(row.free_coordinates)] * _free_units(row, rows.length)
     absent = np.broadcast_to(rows.absent.T, (len(free), 6, len(rows.absent)))
     screws = np.concatenate([free, absent], axis=2)
     return in_lengths(at_points(np.swapaxes(screws, 1, 2), points), rows.length).swapaxes(1, 2)
@@ -176,7 +179,7 @@ def free_screws(row: LegRow, rows: HomeRows, place: PlacedChain, points: Array) 
 
 def _free_units(row: LegRow, length: float) -> Array:
     """Return the units of its free coordinates, 1 rad or the machine's length, m."""
-    return np.array([length if row.slides[place] else 1.0 for place in row.free_coordinates])
+    return np.array([length if row.slides[coordinate] else 1.0 for coordinate in row.free_coordinates])
 
 
 @dataclass(frozen=True)
@@ -185,27 +188,27 @@ class LegsInPlace:
 
     Attributes:
         groups: legs that are alike.
-        places: where the legs of each group are [legs * n].
+        chains: the legs of each group in their places [legs * n].
         free: the screws of what moves freely in them, at the tool point [legs * n].
         holding: the wrenches that all legs carry.
     """
 
     groups: Sequence[LikeRows]
-    places: Sequence[PlacedChain]
+    chains: Sequence[PlacedChain]
     free: Sequence[Screws]
     holding: Holding
 
-    def displacement(self, number: int, motions: int) -> Motions:
+    def displacement(self, leg: int, motions: int) -> Motions:
         """Return the displacement of what the first motions of a leg carry [n].
 
         Args:
-            number: number of the leg.
+            leg: number of the leg.
             motions: number of its motions.
         """
-        group, place = next(pair for pair in zip(self.groups, self.places, strict=True) if number in pair[0].numbers)
-        of_group = place.before[motions]
+        group, chain = next(pair for pair in zip(self.groups, self.chains, strict=True) if leg in pair[0].numbers)
+        of_group = chain.before[motions]
         count = len(of_group.translation) // len(group.numbers)
-        first = group.numbers.index(number) * count
+        first = group.numbers.index(leg) * count
         return of_group.at(np.arange(first, first + count))
 
 
@@ -213,43 +216,46 @@ def legs_in_place(
     rows: HomeRows,
     groups: Sequence[LikeRows],
     coordinates: Sequence[Array],
-    errors: Errors,
+    screws: ErrorScrews,
     tool: Array,
-    soft: Sequence[Array],
+    leg_compliances: Sequence[Array],
 ) -> LegsInPlace:
     """Place the legs at n poses.
 
     Args:
         rows: the machine.
         groups: its legs, those that are alike together.
-        coordinates: of the joints of each leg [n x coordinates].
-        errors: the errors of each leg.
+        coordinates: coordinates of the joints of each leg [n x coordinates].
+        screws: the screw motions by the errors of each leg.
         tool: the tool point, m [n x 3].
-        soft: see `holding`.
+        leg_compliances: see `holding`.
     """
-    places = [group.place(coordinates, errors) for group in groups]
+    chains = [group.place(coordinates, screws) for group in groups]
     free = [
-        Screws(free_screws(group.row, rows, place, np.tile(tool, (len(group.numbers), 1))), group.independent)
-        for group, place in zip(groups, places, strict=True)
+        Screws(free_screws(group.row, rows, chain, np.tile(tool, (len(group.numbers), 1))), group.independent)
+        for group, chain in zip(groups, chains, strict=True)
     ]
-    wrenches = by_leg(groups, [screws.wrenches for screws in free])
-    return LegsInPlace(groups, places, free, holding(rows, wrenches, tool, soft))
+    wrenches = by_leg(groups, [free_of_group.wrenches for free_of_group in free])
+    return LegsInPlace(groups, chains, free, holding(rows, wrenches, tool, leg_compliances))
 
 
-def holding(rows: HomeRows, wrenches: Sequence[Array], tool: Array, soft: Sequence[Array]) -> Holding:
+def holding(rows: HomeRows, wrenches: Sequence[Array], tool: Array, leg_compliances: Sequence[Array]) -> Holding:
     """Find how the legs share a misfit, theory (46) and (47).
+
+    Six wrenches decide it alone; more of them share the misfit with the least energy.
 
     Args:
         rows: the machine.
         wrenches: for each leg, a basis of what it carries at the tool point [n x 6 x m], moments over the length.
         tool: the tool point, m [n x 3].
-        soft: compliance of each leg without its passive joints at the tool, in the length's units [n x 6 x 6].
+        leg_compliances: compliance of each leg without its passive joints at the tool, in the length's units
+            [n x 6 x 6].
     """
     whole = np.concatenate([*wrenches, _guide(rows, tool)], axis=2)
     if whole.shape[2] == 6:
         sharing = _solution(np.swapaxes(whole, 1, 2), np.broadcast_to(np.eye(6), whole.shape))
     else:
-        sharing = _sharing_by_energy(whole, wrenches, soft)
+        sharing = _sharing_by_energy(whole, wrenches, leg_compliances)
     ends = np.cumsum([basis.shape[2] for basis in wrenches])
     return Holding(tuple(wrenches), tuple(np.split(sharing, ends, axis=2)[:-1]))
 
@@ -262,37 +268,37 @@ def _guide(rows: HomeRows, tool: Array) -> Array:
     return np.swapaxes(in_lengths(at_points(absent, tool), rows.length), 1, 2)
 
 
-def _sharing_by_energy(whole: Array, wrenches: Sequence[Array], soft: Sequence[Array]) -> Array:
+def _sharing_by_energy(whole: Array, wrenches: Sequence[Array], leg_compliances: Sequence[Array]) -> Array:
     """Return the shares of the misfits of a redundant machine [n x 6 x wrenches], of least energy, theory (47).
 
     Args:
         whole: the wrenches of all legs and of the guide [n x 6 x wrenches].
-        wrenches, soft: see `holding`.
+        wrenches, leg_compliances: see `holding`.
     """
     count, size = whole.shape[0], whole.shape[2]
-    weights = np.zeros((count, size, size))
+    compliances = np.zeros((count, size, size))  # the guide, whose wrenches stand last, is rigid
     start = 0
-    for basis, compliance in zip(wrenches, soft, strict=True):
+    for basis, leg_compliance in zip(wrenches, leg_compliances, strict=True):
         end = start + basis.shape[2]
-        weights[:, start:end, start:end] = np.swapaxes(basis, 1, 2) @ compliance @ basis
+        compliances[:, start:end, start:end] = np.swapaxes(basis, 1, 2) @ leg_compliance @ basis
         start = end
-    mean = np.trace(weights, axis1=1, axis2=2) / max(start, 1)
-    mean = np.where(np.isfinite(mean) & (mean > 0.0), mean, 1.0)
-    weights = weights / mean[:, None, None] + SOFTEST_SHARE * np.eye(size)
-    resistances = np.swapaxes(_solution(weights, np.swapaxes(whole, 1, 2)), 1, 2)
+    mean = np.trace(compliances, axis1=1, axis2=2) / max(start, 1)
+    mean = np.where(np.isfinite(mean) & (mean > 0.0), mean, 1.0)  # all legs are rigid: least squares
+    compliances = compliances / mean[:, None, None] + SOFTEST_SHARE * np.eye(size)
+    resistances = np.swapaxes(_solution(compliances, np.swapaxes(whole, 1, 2)), 1, 2)
     return _solution(resistances @ np.swapaxes(whole, 1, 2), resistances)
 
 
 def _solution(matrices: Array, right: Array) -> Array:
     """Return solutions of linear equations; NaN where these are singular or not finite."""
     result = np.full(np.broadcast_shapes(matrices.shape[:1], right.shape[:1]) + right.shape[1:], np.nan)
-    sound: Mask = np.asarray(np.isfinite(matrices).all(axis=(1, 2)) & np.isfinite(right).all(axis=(1, 2)))
-    sound[sound] = np.abs(np.linalg.det(matrices[sound])) > LEAST_DIVISOR
-    result[sound] = np.linalg.solve(matrices[sound], right[sound])
+    solvable: Mask = np.asarray(np.isfinite(matrices).all(axis=(1, 2)) & np.isfinite(right).all(axis=(1, 2)))
+    solvable[solvable] = np.abs(np.linalg.det(matrices[solvable])) > LEAST_DIVISOR
+    result[solvable] = np.linalg.solve(matrices[solvable], right[solvable])
     return result
 
 
-def coordinates_toward(row: LegRow, target: Motions, length: float, errors: Mapping[int, Array] | None = None) -> Array:
+def coordinates_toward(row: LegRow, target: Motions, length: float, screws: Mapping[int, Array] | None = None) -> Array:
     """Return coordinates with which a leg takes the platform to a target, or near it [n x coordinates], rad or m.
 
     All of its coordinates move, actuators too, by least-norm steps along a screw motion from the home place.
@@ -301,28 +307,28 @@ def coordinates_toward(row: LegRow, target: Motions, length: float, errors: Mapp
         row: the leg at its home place.
         target: displacement of the platform from the home place [n].
         length: a characteristic length of the machine, m.
-        errors: screw motions of the leg's errors, by the number of motions before them; none if None.
+        screws: screw motions by the leg's errors, by the number of motions before them; none if None.
     """
-    screw, chain, leg_errors = logarithm(target), row.chain, errors or {}
+    way, chain, error_screws = logarithm(target), row.chain, screws or {}
     units = np.where(row.slides, length, 1.0)
     random_rates = chain.rates(chain.place(random_coordinates(row, length)))
     independent = independent_columns(in_lengths(random_rates, length, axis=1))
-    distance = float(np.abs(in_lengths(screw, length)).max(initial=0.0, where=np.isfinite(screw)))
+    distance = float(np.abs(in_lengths(way, length)).max(initial=0.0, where=np.isfinite(way)))
     stages = min(max(int(np.ceil(distance / LONGEST_STAGE)), 1), MOST_STAGES)
-    coordinates = np.zeros((len(screw), row.size))
+    coordinates = np.zeros((len(way), row.size))
     for stage in range(1, stages + 1):
-        goal, is_last = exponential(screw * (stage / stages)), stage == stages
+        goal, is_last = exponential(way * (stage / stages)), stage == stages
 
         def equations(joints: Array, poses: Integers, goal: Motions = goal) -> tuple[Array, Steps]:
-            place = chain.place(joints, errors=errors_at(leg_errors, poses))
-            gap = in_lengths(closing_gap(goal.at(poses), place.end), length)
-            rates = in_lengths(chain.rates(place), length, axis=1) * units
+            placed = chain.place(joints, errors=screws_at(error_screws, poses))
+            gap = in_lengths(closing_gap(goal.at(poses), placed.end), length)
+            rates = in_lengths(chain.rates(placed), length, axis=1) * units
             return largest(gap), lambda unsolved: Screws(rates, independent).steps(gap)[unsolved]
 
         coordinates = newton(
             equations,
             coordinates,
-            len(screw),
+            len(way),
             move=lambda joints, step: joints + step * units,
             most_steps=MOST_CLOSING_STEPS if is_last else STEPS_OF_STAGE,
             step_goal=CLOSED_STEP if is_last else NEARLY_CLOSED_STEP,
@@ -330,9 +336,9 @@ def coordinates_toward(row: LegRow, target: Motions, length: float, errors: Mapp
     return coordinates
 
 
-def errors_at(errors: Mapping[int, Array], poses: Integers) -> dict[int, Array]:
-    """Return the errors of a leg at some poses; those that are the same everywhere stay as they are."""
-    return {behind: error if len(error) == 1 else error[poses] for behind, error in errors.items()}
+def screws_at(screws: Mapping[int, Array], poses: Integers) -> dict[int, Array]:
+    """Return the error screws of a leg at some poses; those that are the same everywhere stay as they are."""
+    return {behind: screw if len(screw) == 1 else screw[poses] for behind, screw in screws.items()}
 
 
 @dataclass(frozen=True)
@@ -363,40 +369,43 @@ class ClosedLegs:
 def closed_legs(
     rows: HomeRows,
     start: ClosedLegs,
-    errors: Errors,
+    screws: ErrorScrews,
     tool_home: Array,
     independent: Sequence[tuple[int, ...]],
-    soft: Sequence[Array],
+    leg_compliances: Sequence[Array],
 ) -> ClosedLegs:
     """Close the legs with their errors while their actuators stand still: Newton's method, theory (48).
+
+    A step is the twist of the tool [6], followed by the steps of the free coordinates of each leg, all in units of the
+    length.
 
     Args:
         rows: the machine at its home place.
         start: joint coordinates, with the actuators where they stand, and the platform nearby.
-        errors: the errors of each leg.
+        screws: the screw motions by the errors of each leg.
         tool_home: the tool point at the home place, m [3].
         independent: see `like_rows`.
-        soft: see `holding`.
+        leg_compliances: see `holding`.
     """
     length, legs, count = rows.length, rows.legs, len(start.settled)
     groups = like_rows(rows, independent, count)
 
     def equations(state: ClosedLegs, poses: Integers) -> tuple[Array, Steps]:
         tool = tool_at(state.platform, tool_home)
-        compliances = [compliance[poses] for compliance in soft]
-        leg_errors = [errors_at(error, poses) for error in errors]
-        placed = legs_in_place(rows, groups, state.coordinates, leg_errors, tool, compliances)
+        compliances = [compliance[poses] for compliance in leg_compliances]
+        screws_at_poses = [screws_at(screws_of_leg, poses) for screws_of_leg in screws]
+        placed = legs_in_place(rows, groups, state.coordinates, screws_at_poses, tool, compliances)
         pose_of_row = [np.tile(np.arange(len(poses)), len(group.numbers)) for group in groups]
         gaps = [
-            -in_lengths(at_points(closing_gap(state.platform.at(pose), place.end), tool[pose]), length)
-            for pose, place in zip(pose_of_row, placed.places, strict=True)
+            -in_lengths(at_points(closing_gap(state.platform.at(pose), chain.end), tool[pose]), length)
+            for pose, chain in zip(pose_of_row, placed.chains, strict=True)
         ]
         misfits = by_leg(groups, gaps)
-        parts = (placed.holding.twist(i, misfit[:, None])[:, 0] for i, misfit in enumerate(misfits))
-        twist = sum(parts, np.zeros((len(poses), 6)))
+        twists = (placed.holding.twist(leg, misfit[:, None])[:, 0] for leg, misfit in enumerate(misfits))
+        twist = sum(twists, np.zeros((len(poses), 6)))
         joint_steps = [
-            screws.steps(twist[pose] - gap)[:, : len(group.row.free_coordinates)]
-            for group, pose, screws, gap in zip(groups, pose_of_row, placed.free, gaps, strict=True)
+            free.steps(twist[pose] - gap)[:, : len(group.row.free_coordinates)]
+            for group, pose, free, gap in zip(groups, pose_of_row, placed.free, gaps, strict=True)
         ]
         step = np.concatenate([twist, *by_leg(groups, joint_steps)], axis=1)
         return largest(np.concatenate(misfits, axis=1)), lambda unsolved: step[unsolved]

@@ -15,6 +15,7 @@ Source: theory (45) and (49).
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -85,17 +86,20 @@ class Insertion:
         return np.ones(len(coordinates)) if self.factor is None else self.factor(coordinates)
 
 
-Source = tuple[MachineError, tuple[Insertion, ...]]
-"""An error and the screw motions that it puts into the legs."""
+class ErrorSource(NamedTuple):
+    """An error and the screw motions that it puts into the legs."""
+
+    error: MachineError
+    insertions: tuple[Insertion, ...]
 
 
-def leg_error_sources(rows: HomeRows) -> list[Source]:
+def leg_error_sources(rows: HomeRows) -> list[ErrorSource]:
     """List the errors of all legs that their own motions can tell apart, leg by leg.
 
     Args:
         rows: the machine at its home place.
     """
-    sources: list[Source] = []
+    sources: list[ErrorSource] = []
     for number, row in enumerate(rows.legs):
         by_rank = sorted(_candidates(number, row, rows), key=lambda candidate: candidate[0])
         sources += _independent_sources(row, rows, [source for _, source in by_rank])
@@ -103,55 +107,51 @@ def leg_error_sources(rows: HomeRows) -> list[Source]:
     return sources
 
 
-def effects(row: LegRow, rows: HomeRows, sources: Sequence[Source], coordinates: Array) -> Array:
+def effects(
+    row: LegRow, rows: HomeRows, insertions_of_errors: Sequence[Sequence[Insertion]], coordinates: Array
+) -> Array:
     """Return the work of the leg's wrenches on its errors at random coordinates [samples * wrenches x errors]."""
-    place = row.chain.place(coordinates)
-    platform_point = place.end.point(np.broadcast_to(rows.point, (len(coordinates), 3)))
-    screws = free_screws(row, rows, place, platform_point)
+    placed = row.chain.place(coordinates)
+    platform_point = placed.end.point(np.broadcast_to(rows.point, (len(coordinates), 3)))
+    screws = free_screws(row, rows, placed, platform_point)
     wrenches = Screws(screws, independent_columns(screws)).wrenches
     columns = []
-    for _, insertions in sources:
+    for insertions in insertions_of_errors:
         twists = sum(
-            place.before[i.behind].twist(np.broadcast_to(i.twist, (len(coordinates), 6)))
-            * i.amount(coordinates)[:, None]
-            for i in insertions
+            placed.before[insertion.behind].twist(np.broadcast_to(insertion.twist, (len(coordinates), 6)))
+            * insertion.amount(coordinates)[:, None]
+            for insertion in insertions
         )
         displacements = in_lengths(at_points(np.asarray(twists), platform_point), rows.length)
         columns.append(np.einsum("nim,ni->nm", wrenches, displacements).ravel())
     return np.stack(columns, axis=1) if columns else np.zeros((0, 0))
 
 
-def _moving_sources(row: LegRow, rows: HomeRows, sources: Sequence[Source]) -> tuple[list[Source], Array]:
+def _moving_sources(row: LegRow, rows: HomeRows, sources: Sequence[ErrorSource]) -> tuple[list[ErrorSource], Array]:
     """Return the errors that move the platform at any of the random coordinates, and their `effects`."""
-    columns = effects(row, rows, sources, random_coordinates(row, rows.length))
+    columns = effects(row, rows, [source.insertions for source in sources], random_coordinates(row, rows.length))
     moving = np.flatnonzero(np.linalg.norm(columns, axis=0) > SEEN_BY_LEG / rows.length)
     return [sources[int(number)] for number in moving], columns[:, moving]
 
 
-def _independent_sources(row: LegRow, rows: HomeRows, sources: Sequence[Source]) -> list[Source]:
+def _independent_sources(row: LegRow, rows: HomeRows, sources: Sequence[ErrorSource]) -> list[ErrorSource]:
     """Return the errors whose effects do not follow from the effects of those before them, in the order of the leg."""
     moving, columns = _moving_sources(row, rows, sources)
     independent = [moving[number] for number in independent_columns(columns[None])]
-    return sorted(independent, key=lambda source: source[1][0].behind)
+    return sorted(independent, key=lambda source: source.insertions[0].behind)
 
 
-def _candidates(number: int, row: LegRow, rows: HomeRows) -> Iterator[tuple[int, Source]]:
+def _candidates(number: int, row: LegRow, rows: HomeRows) -> Iterator[tuple[int, ErrorSource]]:
     """Generate every error that the joints and the end of a leg may have, each with its rank."""
     last_point: Vector | None = None
     for place, unit in enumerate(row.units):
         joint = _JointErrors(number, row.name, unit)
         if unit.drive:
             yield from ((ZEROS, source) for source in joint.drive(row, unit.drive))
-        if place == 0 or unit.point is None or last_point is None:
-            rank = BASE if place == 0 else LINKS
-            where = "on the base" if place == 0 else "on its link"
-            yield from ((rank, joint.shift(name, axis, where)) for name, axis in _named_directions(None))
-        elif (unit.point - last_point).norm() > NO_LINK * rows.length:
-            along = (unit.point - last_point) * (1.0 / (unit.point - last_point).norm())
-            yield LENGTHS, joint.length(along, row.units[place - 1].name)
-            yield from ((LINKS, joint.shift(name, axis, "on its link")) for name, axis in _named_directions(along))
-        elif unit.kind != "ball":
-            yield from ((OFFSETS, joint.shift(name, axis, "on its link")) for name, axis in _named_directions(None))
+        if place == 0:
+            yield from ((BASE, joint.shift(name, axis, "on the base")) for name, axis in _named_directions(None))
+        else:
+            yield from _errors_of_link(joint, row.units[place - 1].name, last_point, NO_LINK * rows.length)
         point = unit.point or last_point or ZERO
         if unit.kind != "ball":
             yield from (
@@ -165,11 +165,29 @@ def _candidates(number: int, row: LegRow, rows: HomeRows) -> Iterator[tuple[int,
     axes = [Vector(*column) for column in rows.rotation.T.tolist()]
     last_joint, end = _JointErrors(number, row.name, row.units[-1]), len(row.twists)
     for name, axis in zip("xyz", axes, strict=True):
-        yield PLATFORM, last_joint.shift(f"platform.{name}", axis, "on the platform", end)
-        yield TILTS, last_joint.tilt(f"platform.r{name}", axis, last_point or Vector(*rows.point.tolist()), end)
+        yield PLATFORM, last_joint.platform_shift(name, axis, end)
+        yield TILTS, last_joint.platform_tilt(name, axis, last_point or Vector(*rows.point.tolist()), end)
 
 
-def _clearances(number: int, row: LegRow) -> Iterator[Source]:
+def _errors_of_link(
+    joint: "_JointErrors", joint_before: str, last_point: Vector | None, no_link: float
+) -> Iterator[tuple[int, ErrorSource]]:
+    """Generate the errors of where a joint lies on the link from the one before it, each with its rank.
+
+    The link begins at the last point, the last centre of a joint; up to a distance of `no_link`, m, there is no link.
+    """
+    point = joint.unit.point
+    if point is None or last_point is None:
+        yield from ((LINKS, joint.shift(name, axis, "on its link")) for name, axis in _named_directions(None))
+    elif (span := point - last_point).norm() > no_link:
+        along = span * (1.0 / span.norm())
+        yield LENGTHS, joint.length(along, joint_before)
+        yield from ((LINKS, joint.shift(name, axis, "on its link")) for name, axis in _named_directions(along))
+    elif joint.unit.kind != "ball":
+        yield from ((OFFSETS, joint.shift(name, axis, "on its link")) for name, axis in _named_directions(None))
+
+
+def _clearances(number: int, row: LegRow) -> Iterator[ErrorSource]:
     """Generate the clearances of the passive joints of a leg, one for each direction in which a joint holds."""
     for unit in row.units:
         if unit.drive or unit.bars:
@@ -237,27 +255,33 @@ class _JointErrors:
     def _of(self) -> str:
         return self.leg if "leg" in self.leg else f'leg "{self.leg}"'
 
-    def shift(self, name: str, axis: Vector, where: str, behind: int | None = None) -> Source:
-        """Return the error of a joint that lies elsewhere on its link, or of the platform elsewhere on the last one."""
+    def shift(self, name: str, axis: Vector, where: str) -> ErrorSource:
+        """Return the error of a joint that lies elsewhere on the base or on its link."""
         words = f"position of the {self.title} {where} along {_direction(axis)}"
-        # A joint that lies further along the platform leaves the platform so much behind.
-        return self._source(name, "length", words, _slide(axis if behind is None else -axis), behind)
+        return self._source(name, "length", words, _slide(axis))
 
-    def length(self, along: Vector, before: str) -> Source:
+    def platform_shift(self, name: str, axis: Vector, end: int) -> ErrorSource:
+        """Return the error of the last joint that lies elsewhere on the platform, which is so much behind."""
+        words = f"position of the {self.title} on the platform along {_direction(axis)}"
+        return self._source(f"platform.{name}", "length", words, _slide(-axis), end)
+
+    def length(self, along: Vector, before: str) -> ErrorSource:
         """Return the error of a link that is longer."""
         words = f"length of {self._of} from its {before} to its {self.unit.name}"
         return self._source("length", "length", words, _slide(along))
 
-    def tilt(self, name: str, axis: Vector, point: Vector, behind: int | None = None) -> Source:
-        """Return the error of a joint whose axes are turned on the link before it, or of the platform on the joint."""
-        if behind is not None:
-            words = f"direction of the {self.title} on the platform about {_direction(axis)}"
-            return self._source(name, "angle", words, -_turn(axis, point), behind)
+    def tilt(self, name: str, axis: Vector, point: Vector) -> ErrorSource:
+        """Return the error of a joint whose axes are turned on the link before it."""
         part = "near side" if self.unit.bars is not None else "axis"
         words = f"direction of the {part} of the {self.title} about {_direction(axis)}"
         return self._source(f"r{name}", "angle", words, _turn(axis, point))
 
-    def between_axes(self, point: Vector) -> Iterator[Source]:
+    def platform_tilt(self, name: str, axis: Vector, point: Vector, end: int) -> ErrorSource:
+        """Return the error of the last joint that is turned on the platform, behind all motions of the leg."""
+        words = f"direction of the {self.title} on the platform about {_direction(axis)}"
+        return self._source(f"platform.r{name}", "angle", words, -_turn(axis, point), end)
+
+    def between_axes(self, point: Vector) -> Iterator[ErrorSource]:
         """Generate the errors of a universal joint whose axes are not perpendicular or do not meet."""
         normal = self.unit.axes[0].cross(self.unit.axes[1])
         normal, behind = normal * (1.0 / normal.norm()), self.unit.first + 1
@@ -266,7 +290,7 @@ class _JointErrors:
         words = f"distance between the axes of the {self.title}"
         yield self._source("offset", "length", words, _slide(normal), behind)
 
-    def bars(self, bars: Parallelogram, coordinate: int) -> Iterator[Source]:
+    def bars(self, bars: Parallelogram, coordinate: int) -> Iterator[ErrorSource]:
         """Generate the errors of bars that are both longer, or longer on one side than on the other."""
         along, span = bars.along, float((bars.far - bars.near).norm())
         cosine, sine = float(bars.side.dot(along)), float(bars.normal.dot(bars.side.cross(along)))
@@ -283,7 +307,7 @@ class _JointErrors:
         twist = _turn(bars.normal, bars.far) / float(bars.width)
         yield self._source("difference", "length", words, twist, behind, rotation_per_difference)
 
-    def drive(self, row: LegRow, drive: ActuatorReading) -> Iterator[Source]:
+    def drive(self, row: LegRow, drive: ActuatorReading) -> Iterator[ErrorSource]:
         """Generate zero and gain of the joint's actuator."""
 
         def actuator_coordinate(coordinates: Array) -> Array:
@@ -295,7 +319,7 @@ class _JointErrors:
         words = f"gain of the {self.title}"
         yield self._source("gain", "share", words, twist, factor=actuator_coordinate, group="gains")
 
-    def clearance(self, name: str, axis: Vector) -> Source:
+    def clearance(self, name: str, axis: Vector) -> ErrorSource:
         """Return the error of a joint that is free to move a little where it should hold."""
         words = f"clearance of the {self.title} along {_direction(axis)}"
         return self._source(f"clearance.{name}", "length", words, _slide(axis), group="clearances")
@@ -309,13 +333,15 @@ class _JointErrors:
         behind: int | None = None,
         factor: Callable[[Array], Array] | None = None,
         group: str = "geometry",
-    ) -> Source:
+    ) -> ErrorSource:
+        """Return an error of this joint; it acts before the joint if `behind` is None, see `Insertion`."""
         path = f"legs.{self.leg}.{self.unit.name}.{name}"
         error = MachineError(path=path, kind=kind, group=group, words=words, leg=self.leg)
-        return error, (Insertion(self.number, self.unit.first if behind is None else behind, twist, factor),)
+        insertion = Insertion(self.number, self.unit.first if behind is None else behind, twist, factor)
+        return ErrorSource(error, (insertion,))
 
 
-def shared_error_sources(machine: Machine, rows: HomeRows) -> list[Source]:
+def shared_error_sources(machine: Machine, rows: HomeRows) -> list[ErrorSource]:
     """List the lengths and angles of the table [geometry] of a family; none of a machine written leg by leg.
 
     Args:
@@ -324,37 +350,34 @@ def shared_error_sources(machine: Machine, rows: HomeRows) -> list[Source]:
     """
     if machine.family.chains:
         return []
-    numbers, sources = values(machine), []
+    nominal, sources = values(machine), []
     fields = {leaf: p for p in parameters(machine.family) if p.path.startswith(SHARED_TABLE) for leaf in p.leaves}
     for path, field in fields.items():
         kind = field.quantity.kind
         if kind not in SHARED_KINDS:
             continue
         step = SHARED_STEP * (rows.length if kind == "length" else 1.0)
-        more, less = (home_rows(with_values(machine, {path: float(numbers[path]) + s * step})) for s in (1.0, -1.0))
+        more, less = (home_rows(with_values(machine, {path: float(nominal[path]) + s * step})) for s in (1.0, -1.0))
         insertions = tuple(_shared_insertions(rows, more, less, 2.0 * step))
         if insertions and all(np.isfinite(insertion.twist).all() for insertion in insertions):
             error = MachineError(path=path, kind=kind, group="shared", words=field.quantity.meaning, leg="")
-            sources.append((error, insertions))
+            sources.append(ErrorSource(error, insertions))
     return sources
 
 
 def _shared_insertions(rows: HomeRows, more: HomeRows, less: HomeRows, step: float) -> Iterator[Insertion]:
-    """Generate the motions of joints and zeros per unit of a number, from the machine with more and less of it."""
+    """Generate the motions of joints and zeros per unit of a number; `step` lies between the two other machines."""
     home = Motions(more.rotation[None], more.point[None]) @ Motions(less.rotation[None], less.point[None]).inverse()
     platform = logarithm(home)[0] / step
-    for number, row in enumerate(rows.legs):
-        legs = more.legs[number], less.legs[number]
-        for place, unit in enumerate(row.units):
-            units = legs[0].units[place], legs[1].units[place]
+    for number, (row, more_row, less_row) in enumerate(zip(rows.legs, more.legs, less.legs, strict=True)):
+        for unit, more_unit, less_unit in zip(row.units, more_row.units, less_row.units, strict=True):
             for motion in range(unit.first, unit.last):
-                twist = _axis_motion(motion, unit, *units) / step
+                twist = _axis_motion(motion, unit, more_unit, less_unit) / step
                 if twist.any():
                     yield Insertion(number, motion, twist)
-                    yield Insertion(number, motion + 1, -twist)
-            drives = units[0].drive, units[1].drive
-            if unit.drive and drives[0] and drives[1] and drives[0].home != drives[1].home:
-                rate = unit.drive.sense * (drives[1].home - drives[0].home) / step
+                    yield Insertion(number, motion + 1, -twist)  # only the axis lies elsewhere, not what follows it
+            if unit.drive and more_unit.drive and less_unit.drive and more_unit.drive.home != less_unit.drive.home:
+                rate = unit.drive.sense * (less_unit.drive.home - more_unit.drive.home) / step
                 yield Insertion(number, unit.first, row.twists[unit.first] * rate)
         if platform.any():
             yield Insertion(number, len(row.twists), platform)
@@ -368,7 +391,7 @@ def _axis_motion(motion: int, unit: Unit, more: Unit, less: Unit) -> Array:
         unit, more, less: its joint as drawn, with more, and with less of a number.
     """
     place = motion - unit.first
-    axis = 0 if unit.bars else place
+    axis = 0 if unit.bars else place  # both motions of a parallelogram have its one normal
     turning = less.axes[axis].cross(more.axes[axis])
     point, more_point, less_point = (
         joint.bars.far if joint.bars and place else joint.point for joint in (unit, more, less)
@@ -404,15 +427,24 @@ def flexible_springs(response: Response, count: int) -> Iterator[tuple[FlexibleS
         response: response of the machine at the poses.
         count: number of poses.
     """
-    of_legs = [(leg.name, spring) for leg in response.configuration.legs for spring in leg.springs]
-    parts = Counter(spring.part_name for _, spring in of_legs)
-    numbers = zip(of_legs, response.statics.flexibility, response.statics.compliance, strict=True)
-    for (leg, spring), twist, compliance in numbers:
-        size = stacked_columns([compliance], count)[:, 0]
-        if np.isfinite(size).all() and (size > 0.0).any():
-            name = spring.part_name if parts[spring.part_name] == 1 else spring.name
-            part = name.removeprefix(f"{leg} ").replace(".", " ")
-            words = f"compliance of the {part} of {leg}, relative"
-            path = f"legs.{leg}.{part}.compliance"
-            error = MachineError(path=path, kind="share", group="compliances", words=words, leg=leg)
-            yield FlexibleSpring(stacked_columns(twist.components(), count), size), error
+    springs = [(leg.name, spring) for leg in response.configuration.legs for spring in leg.springs]
+    springs_of_part = Counter(spring.part_name for _, spring in springs)
+    with_effects = zip(springs, response.statics.flexibility, response.statics.compliance, strict=True)
+    for (leg, spring), twist, spring_compliance in with_effects:
+        compliance = stacked_columns([spring_compliance], count)[:, 0]
+        if np.isfinite(compliance).all() and (compliance > 0.0).any():
+            title = spring.part_name if springs_of_part[spring.part_name] == 1 else spring.name
+            name = name_in_leg(title, leg)
+            words = f"compliance of the {name} of {leg}, relative"
+            error = MachineError(compliance_path(leg, name), kind="share", group="compliances", words=words, leg=leg)
+            yield FlexibleSpring(stacked_columns(twist.components(), count), compliance), error
+
+
+def name_in_leg(title: str, leg: str) -> str:
+    """Return the name of a part without that of its leg; it is a part of a path, and so it has no dot."""
+    return title.removeprefix(f"{leg} ").replace(".", " ")
+
+
+def compliance_path(leg: str, spring: str) -> str:
+    """Return the path of the error of a spring's compliance, by the names of its leg and of the spring in it."""
+    return f"legs.{leg}.{spring}.compliance"

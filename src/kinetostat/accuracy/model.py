@@ -8,6 +8,7 @@ all of them are rigid. Families and machines written leg by leg, spatial and pla
 Source: theory (45) to (49); compliances, theory (10).
 """
 
+from collections import deque
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property
@@ -27,15 +28,15 @@ from kinetostat.accuracy.closing import (
     tool_at,
 )
 from kinetostat.accuracy.errors import (
+    ErrorSource,
     FlexibleSpring,
     Insertion,
     MachineError,
-    Source,
     flexible_springs,
     leg_error_sources,
     shared_error_sources,
 )
-from kinetostat.accuracy.rows import Errors, HomeRows, LegRow, home_rows, like_rows, random_coordinates
+from kinetostat.accuracy.rows import ErrorScrews, HomeRows, LegRow, home_rows, like_rows, random_coordinates
 from kinetostat.arrays import Array, Codes, Integers, Mask
 from kinetostat.equilibrium.state import MachineState, state_of, states_at
 from kinetostat.frozen import dataclass
@@ -45,7 +46,7 @@ from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE
-from kinetostat.numerics.motions import Motions, cross
+from kinetostat.numerics.motions import Motions, work_on_exponents
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import ONE_PLACEMENT
 
@@ -78,28 +79,28 @@ class DrawnMachine:
     springs: tuple[FlexibleSpring, ...]
     leg_compliances: tuple[Array, ...]
 
-    def at_poses(self, rows: Integers) -> "DrawnMachine":
-        """Return the machine at some of the poses [rows]."""
+    def at_poses(self, poses: Integers) -> "DrawnMachine":
+        """Return the machine at some of the poses, by their numbers."""
         return DrawnMachine(
-            status=self.status[rows],
-            state=self.state.at(rows),
-            tool=self.tool[rows],
-            axes=self.axes[rows],
-            actuators=self.actuators[rows],
-            load=self.load[rows],
-            springs=tuple(FlexibleSpring(spring.twist[rows], spring.compliance[rows]) for spring in self.springs),
-            leg_compliances=tuple(compliance[rows] for compliance in self.leg_compliances),
+            status=self.status[poses],
+            state=self.state.at(poses),
+            tool=self.tool[poses],
+            axes=self.axes[poses],
+            actuators=self.actuators[poses],
+            load=self.load[poses],
+            springs=tuple(FlexibleSpring(spring.twist[poses], spring.compliance[poses]) for spring in self.springs),
+            leg_compliances=tuple(compliance[poses] for compliance in self.leg_compliances),
         )
 
 
 @dataclass(frozen=True, eq=False)
-class ErrorsBehind:
-    """Errors that displace what follows the same motion of a leg, each of them once.
+class ErrorsBehindMotion:
+    """Errors that act behind the same motion of a leg; an error that acts there twice is in two of these.
 
     Attributes:
         leg: number of the leg.
         behind: number of the leg's motions that come before them.
-        numbers: numbers of the errors, k of them.
+        numbers: numbers of the errors, k different ones.
         twists: the small screw motion in home place per unit of each [k x 6].
         factors: factors of the twists at the poses [n x k].
         are_constant: whether all of these factors are 1.
@@ -112,14 +113,14 @@ class ErrorsBehind:
     factors: Array
     are_constant: bool
 
-    def motion(self, values: Array) -> Array | None:
+    def screw(self, values: Array) -> Array | None:
         """Return their screw motion [1 or n x 6] at values of all errors [1 or n x errors]; None if all are 0."""
-        amounts = values[:, self.numbers]
-        if not amounts.any():
+        own_values = values[:, self.numbers]
+        if not own_values.any():
             return None
-        return np.asarray((amounts if self.are_constant else amounts * self.factors) @ self.twists)
+        return np.asarray((own_values if self.are_constant else own_values * self.factors) @ self.twists)
 
-    def among(self, wanted: Collection[int]) -> "ErrorsBehind":
+    def among(self, wanted: Collection[int]) -> "ErrorsBehindMotion":
         """Return those of them whose numbers are wanted."""
         places = [place for place, number in enumerate(self.numbers) if number in wanted]
         numbers = tuple(self.numbers[place] for place in places)
@@ -133,9 +134,9 @@ class ErrorModel:
     Attributes:
         machine: the machine as drawn.
         drawn: the machine without errors at the poses.
-        errors: the numbers that may be wrong.
-        sources: the screw motions that errors put into the legs, in the order of `errors`; compliances, which are the
-            last errors, put none there.
+        errors: the numbers that may be wrong: first those that have `sources`, then the compliances of the springs of
+            `drawn`, in their order.
+        sources: the screw motions that errors put into the legs, in the order of `errors`; compliances put none there.
         rows: the legs at the home place.
         tool_home: the tool point at the home place, m [3].
         independent: for each leg, numbers of its free screws that do not follow from those before them, wherever it is.
@@ -144,11 +145,12 @@ class ErrorModel:
     machine: Machine
     drawn: DrawnMachine
     errors: tuple[MachineError, ...]
-    sources: tuple[Source, ...]
+    sources: tuple[ErrorSource, ...]
     rows: HomeRows
     tool_home: Array
     independent: tuple[tuple[int, ...], ...]
-    _last_state: dict[bytes, ClosedLegs] = field(default_factory=dict)
+    _last_closed: deque[tuple[bytes, ClosedLegs]] = field(default_factory=lambda: deque(maxlen=1), init=False)
+    """The values of the last `closed_state`, as bytes, and what it returned; a copy of the model begins without."""
 
     def __len__(self) -> int:
         return len(self.drawn.status)
@@ -163,64 +165,64 @@ class ErrorModel:
         """Whether the legs carry more wrenches than the platform needs, so that they share a misfit."""
         return sum(6 - len(screws) for screws in self.independent) + len(self.rows.absent) > 6
 
-    def at_poses(self, rows: Integers) -> "ErrorModel":
-        """Return the model at some of its poses [rows]."""
-        return replace(self, drawn=self.drawn.at_poses(rows), _last_state={})
+    def at_poses(self, poses: Integers) -> "ErrorModel":
+        """Return the model at some of its poses, by their numbers."""
+        return replace(self, drawn=self.drawn.at_poses(poses))
 
-    def leg_errors(self, values: Array) -> Errors:
+    def error_screws(self, values: Array) -> ErrorScrews:
         """Return the screw motions that errors put into each leg at the poses, one for all of them where they agree.
 
         Args:
             values: values of the errors, SI [errors], or others at each pose [n x errors].
         """
-        motions: Errors = [{} for _ in self.rows.legs]
+        screws: ErrorScrews = [{} for _ in self.rows.legs]
         values_at_poses = np.atleast_2d(np.asarray(values, dtype=float))
-        for errors in self._errors_behind:
-            motion = errors.motion(values_at_poses)
-            if motion is not None:
-                others = motions[errors.leg].get(errors.behind)
-                motions[errors.leg][errors.behind] = motion if others is None else others + motion
-        return motions
+        for group in self._errors_by_motion:
+            screw = group.screw(values_at_poses)
+            if screw is not None:
+                others = screws[group.leg].get(group.behind)
+                screws[group.leg][group.behind] = screw if others is None else others + screw
+        return screws
 
     @cached_property
-    def _errors_behind(self) -> tuple[ErrorsBehind, ...]:
-        """The errors of all legs by the motions behind which they stand, leg by leg."""
-        groups: dict[tuple[int, int, int], dict[int, Insertion]] = {}
-        for number, (_, insertions) in enumerate(self.sources):
-            for i in insertions:
-                repetition = 0  # an error may stand twice behind one motion
-                while number in groups.setdefault((i.leg, i.behind, repetition), {}):
+    def _errors_by_motion(self) -> tuple[ErrorsBehindMotion, ...]:
+        """The errors of all legs by the motions behind which they act, leg by leg."""
+        insertions: dict[tuple[int, int, int], dict[int, Insertion]] = {}
+        for number, source in enumerate(self.sources):
+            for insertion in source.insertions:
+                repetition = 0  # an error may act twice behind one motion
+                while number in insertions.setdefault((insertion.leg, insertion.behind, repetition), {}):
                     repetition += 1
-                groups[i.leg, i.behind, repetition][number] = i
-        result = []
-        for (leg, behind, _), insertion_of_error in sorted(groups.items(), key=itemgetter(0)):
-            coordinates, group = self.drawn.state.coordinates[leg], insertion_of_error.values()
-            errors_behind = ErrorsBehind(
+                insertions[insertion.leg, insertion.behind, repetition][number] = insertion
+        groups = []
+        for (leg, behind, _), insertion_of_error in sorted(insertions.items(), key=itemgetter(0)):
+            coordinates, members = self.drawn.state.coordinates[leg], insertion_of_error.values()
+            group = ErrorsBehindMotion(
                 leg=leg,
                 behind=behind,
                 numbers=tuple(insertion_of_error),
-                twists=np.array([i.twist for i in group]),
-                factors=np.stack([i.amount(coordinates) for i in group], axis=1),
-                are_constant=all(i.factor is None for i in group),
+                twists=np.array([insertion.twist for insertion in members]),
+                factors=np.stack([insertion.amount(coordinates) for insertion in members], axis=1),
+                are_constant=all(insertion.factor is None for insertion in members),
             )
-            result.append(errors_behind)
-        return tuple(result)
+            groups.append(group)
+        return tuple(groups)
 
     def closed_state(self, values: Array) -> ClosedLegs:
         """Place all legs with errors [errors] or [n x errors], theory (48).
 
-        The state at the last values is kept, because a fit asks for it again.
+        The state at the last values is kept: a fit first asks for the residuals at new values and then, if these are
+        better, for the rates there.
         """
         key = np.asarray(values, dtype=float).tobytes()
-        if key not in self._last_state:
-            drawn, errors = self.drawn, self.leg_errors(values)
-            with np.errstate(all="ignore"):
-                state = closed_legs(
-                    self.rows, drawn.state, errors, self.tool_home, self.independent, drawn.leg_compliances
-                )
-            self._last_state.clear()
-            self._last_state[key] = state
-        return self._last_state[key]
+        for last_key, last_state in tuple(self._last_closed):
+            if last_key == key:
+                return last_state
+        drawn, screws = self.drawn, self.error_screws(values)
+        with np.errstate(all="ignore"):
+            state = closed_legs(self.rows, drawn.state, screws, self.tool_home, self.independent, drawn.leg_compliances)
+        self._last_closed.append((key, state))  # takes the place of the last one in one step, so that threads may share
+        return state
 
     def rates(self, values: Array | None = None) -> Array:
         """Motion of the tool per unit of each error, with the actuators held, theory (46).
@@ -234,7 +236,7 @@ class ErrorModel:
         """
         if values is None:
             return self._rates_at(self.drawn.state, [{} for _ in self.rows.legs])
-        return self._rates_at(self.closed_state(values), self.leg_errors(values))
+        return self._rates_at(self.closed_state(values), self.error_screws(values))
 
     def displacement(self, values: Array) -> tuple[Array, Codes]:
         """Displacement of the tool by errors of any size, theory (48); compliances add to first order.
@@ -262,7 +264,7 @@ class ErrorModel:
             values: values of the errors, SI.
             wanted: numbers of the errors whose rates are needed; the other rates are 0.
         """
-        rates = self._rates_at(self.closed_state(values), self.leg_errors(values), wanted)
+        rates = self._rates_at(self.closed_state(values), self.error_screws(values), wanted)
         return self.displacement(values)[0], rates
 
     def deflections(self, wrenches: Array) -> Array:
@@ -275,62 +277,32 @@ class ErrorModel:
         parts = [spring.deflection(wrenches) for spring in self.drawn.springs]
         return np.stack(parts, axis=2) if parts else np.zeros((len(self), 6, 0))
 
-    def _rates_at(self, state: ClosedLegs, errors: Errors, wanted: Collection[int] | None = None) -> Array:
-        """Return `rates` at a state with errors of the legs; only those of the wanted errors, or of all if None."""
+    def _rates_at(self, state: ClosedLegs, screws: ErrorScrews, wanted: Collection[int] | None = None) -> Array:
+        """Return `rates` at a state with error screws of the legs; only of the wanted errors, or of all if None."""
         tool = tool_at(state.platform, self.tool_home)
-        by_leg: dict[int, list[ErrorsBehind]] = {}
-        for group in self._errors_behind:
-            group = group if wanted is None else group.among(wanted)
-            if group.numbers:
-                by_leg.setdefault(group.leg, []).append(group)
+        groups_of_leg: dict[int, list[ErrorsBehindMotion]] = {}
+        for group in self._errors_by_motion:
+            wanted_group = group if wanted is None else group.among(wanted)
+            if wanted_group.numbers:
+                groups_of_leg.setdefault(group.leg, []).append(wanted_group)
         with np.errstate(all="ignore"):
             like = like_rows(self.rows, self.independent, len(self))
-            placed = legs_in_place(self.rows, like, state.coordinates, errors, tool, self.drawn.leg_compliances)
-            result = np.zeros((len(self), 6, len(self.errors)))
-            for leg, groups in by_leg.items():
+            placed = legs_in_place(self.rows, like, state.coordinates, screws, tool, self.drawn.leg_compliances)
+            rates = np.zeros((len(self), 6, len(self.errors)))
+            for leg, groups in groups_of_leg.items():
                 wrenches = placed.holding.at_origin(leg, tool, self.length)
                 carriers = [placed.displacement(leg, group.behind) for group in groups]
-                present = [errors[leg].get(group.behind, np.zeros(6)) for group in groups]
-                present = [np.broadcast_to(error, (len(self), 6)) for error in present]
-                works = _work_by_errors(wrenches, carriers, np.stack(present))
+                present_screws = [
+                    np.broadcast_to(screws[leg].get(group.behind, np.zeros(6)), (len(self), 6)) for group in groups
+                ]
+                works = work_on_exponents(wrenches, carriers, np.stack(present_screws))
                 for group, work in zip(groups, works, strict=True):
                     work_of_errors = np.swapaxes(work, 1, 2) @ group.twists.T * group.factors[:, None]
-                    result[:, :, group.numbers] += placed.holding.shares[leg] @ work_of_errors
-        result[:, 3:] *= self.length
-        result[:, :, len(self.sources) :] = self.deflections(self.drawn.load)
-        sound = np.isin(self.drawn.status, REGULAR) & state.settled
-        return np.where(sound[:, None, None], result, np.nan)
-
-
-def _work_by_errors(wrenches: Array, carriers: Sequence[Motions], errors: Array) -> Array:
-    """Return the work of wrenches on screws that are added to errors of a leg [groups x n x 6 x m].
-
-    By a change of an error e, exp(e) changes on the left by screws of the body that carries it. The error is small, so
-    that the series 1 + B / 2 + B^2 / 6 in its transposed bracket B suffices for these.
-
-    Args:
-        wrenches: wrenches of the leg at the base origin [n x 6 x m].
-        carriers: for each group of errors, the displacement of the body that carries it [n].
-        errors: the errors of each group [groups x n x 6].
-    """
-    rotation, translation = (
-        np.stack([getattr(body, part) for body in carriers]) for part in ("rotation", "translation")
-    )
-    moments, forces = np.swapaxes(wrenches[:, :3], 1, 2), np.swapaxes(wrenches[:, 3:], 1, 2)
-    moments = moments + cross(forces, translation[..., None, :])
-    in_body = np.concatenate([np.swapaxes(part @ rotation, -2, -1) for part in (moments, forces)], axis=-2)
-    if not errors.any():
-        return in_body
-    first = _bracket(errors, in_body)
-    return np.asarray(in_body + first / 2.0 + _bracket(errors, first) / 6.0)
-
-
-def _bracket(screw: Array, wrenches: Array) -> Array:
-    """Return the work of wrenches [... x 6 x m] on the brackets of a screw [... x 6] with others."""
-    moments, forces = np.swapaxes(wrenches[..., :3, :], -2, -1), np.swapaxes(wrenches[..., 3:, :], -2, -1)
-    rotation, translation = screw[..., None, :3], screw[..., None, 3:]
-    parts = cross(moments, rotation) + cross(forces, translation), cross(forces, rotation)
-    return np.concatenate([np.swapaxes(part, -2, -1) for part in parts], axis=-2)
+                    rates[:, :, group.numbers] += placed.holding.shares[leg] @ work_of_errors
+        rates[:, 3:] *= self.length
+        rates[:, :, len(self.sources) :] = self.deflections(self.drawn.load)
+        has_place = np.isin(self.drawn.status, REGULAR) & state.settled
+        return np.where(has_place[:, None, None], rates, np.nan)
 
 
 def error_model(
@@ -352,8 +324,8 @@ def error_model(
     others = [path for path in columns if not path.startswith((POSE, LOAD))]
     if others:
         raise InputError(
-            f'"{others[0]}" is not a coordinate of the pose of {state.machine.name}, nor a load; errors are of one '
-            "machine."
+            f'"{others[0]}" is not a coordinate of the pose of {state.machine.name}, nor a load; errors are those of '
+            f'one design: vary coordinates and loads only, such as "{POSE}x" or "{LOAD}gravity_angle".'
         )
     rows = home_rows(state.machine)
     if not all(np.isfinite(twist).all() for row in rows.legs for twist in row.twists):
@@ -371,7 +343,7 @@ def error_model(
     return ErrorModel(
         machine=state.machine,
         drawn=replace(drawn, springs=tuple(spring for spring, _ in flexible)),
-        errors=(*(error for error, _ in sources), *(error for _, error in flexible)),
+        errors=(*(source.error for source in sources), *(error for _, error in flexible)),
         sources=sources,
         rows=rows,
         tool_home=tool_home,
@@ -396,10 +368,10 @@ def _drawn_machine(
     coordinates = tuple(coordinates_toward(row, platform, rows.length) for row in rows.legs)
     actuators = stacked_columns([actuator.coordinate for actuator in stand(posed.machine, posed.joints)], count)
     status = np.array(np.broadcast_to(np.asarray(response.status), (count,)), dtype=np.int64)
-    elsewhere = _is_elsewhere(rows, coordinates, actuators) & np.isin(status, REGULAR)
+    is_elsewhere = _is_elsewhere(rows, coordinates, actuators) & np.isin(status, REGULAR)
     wrench = stacked_columns(response.load.components(), count) if load is None else np.broadcast_to(load, (count, 6))
     return DrawnMachine(
-        status=np.where(elsewhere, int(Status.NOT_CONVERGED), status),
+        status=np.where(is_elsewhere, int(Status.NOT_CONVERGED), status),
         state=ClosedLegs(platform, coordinates, np.ones(count, dtype=bool)),
         tool=tool_at(platform, tool_home),
         axes=axes,
@@ -413,15 +385,18 @@ def _drawn_machine(
 def _displacement(rows: HomeRows, response: Response, count: int) -> tuple[Motions, Array]:
     """Return the displacement of the platform from its home place, and its axes as columns [n x 3 x 3]."""
     placement = response.configuration.platform
-    axes = (placement.rotation.x, placement.rotation.y, placement.rotation.z)
-    columns = np.stack([stacked_columns(axis.components(), count) for axis in axes], axis=2)
-    rotation = columns @ rows.rotation.T
+    vectors = (placement.rotation.x, placement.rotation.y, placement.rotation.z)
+    axes = np.stack([stacked_columns(vector.components(), count) for vector in vectors], axis=2)
+    rotation = axes @ rows.rotation.T
     point = stacked_columns(placement.translation.components(), count)
-    return Motions(rotation, point - np.einsum("nij,j->ni", rotation, rows.point)), columns
+    return Motions(rotation, point - np.einsum("nij,j->ni", rotation, rows.point)), axes
 
 
 def _is_elsewhere(rows: HomeRows, coordinates: Sequence[Array], actuators: Array) -> Mask:
-    """Return whether a leg that is followed from the home place has its actuator elsewhere than the machine [n]."""
+    """Return whether a leg that is followed from the home place has its actuator elsewhere than the machine [n].
+
+    Then it has come to another assembly mode than the machine, and its errors would be those of another machine.
+    """
     result = np.zeros(len(actuators), dtype=bool)
     for row, joints in zip(rows.legs, coordinates, strict=True):
         for drive in (unit.drive for unit in row.units if unit.drive):
@@ -439,12 +414,13 @@ def _independent_screws(row: LegRow, rows: HomeRows) -> tuple[int, ...]:
 
 def _leg_compliances(response: Response, rows: HomeRows, count: int) -> tuple[Array, ...]:
     """Return the compliance of the springs of each leg at the tool, in units of the length [n x 6 x 6]."""
-    result = []
+    matrices = []
     for leg in response.legs:
-        soft = np.zeros((count, 6, 6))
-        for twist, compliance in zip(leg.elastic, leg.compliance, strict=True):
-            size = stacked_columns([compliance], count)
+        matrix = np.zeros((count, 6, 6))
+        for twist, spring_compliance in zip(leg.elastic, leg.compliance, strict=True):
+            compliance = stacked_columns([spring_compliance], count)
+            compliance = np.where(np.isfinite(compliance), compliance, 0.0)  # a free spring is a joint
             screw = in_lengths(stacked_columns(twist.components(), count), rows.length)
-            soft += np.where(np.isfinite(size), size, 0.0)[:, :, None] * screw[:, :, None] * screw[:, None]
-        result.append(soft)
-    return tuple(result)
+            matrix += compliance[:, :, None] * screw[:, :, None] * screw[:, None]
+        matrices.append(matrix)
+    return tuple(matrices)

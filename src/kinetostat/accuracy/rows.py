@@ -8,10 +8,11 @@ Source: theory (35) and (45).
 """
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import field, replace
-from functools import cached_property
-from typing import Any
+from functools import cached_property, partial
+from itertools import chain as chained
+from itertools import count as counted
 
 import numpy as np
 
@@ -35,9 +36,9 @@ LARGEST_TRAVEL = 0.15
 """Farthest displacement of joints there, as a share of the machine's length."""
 CENTRES = {2: "universal", 3: "ball"}
 """Names of revolutes in a row through one point, by their number."""
-Errors = list[dict[int, Array]]
-"""For each leg, by the number of motions before it, the small screw motion of an error in home place [n x 6]; [1 x 6]
-where it is the same at all poses."""
+ErrorScrews = list[dict[int, Array]]
+"""For each leg, the small screw motions by its errors in home place [n x 6], by the number of motions before them;
+[1 x 6] where one is the same at all poses."""
 
 
 @dataclass(frozen=True)
@@ -45,18 +46,22 @@ class ActuatorReading:
     """Coordinate of an actuator as a function of the joint's.
 
     Attributes:
-        number: number of the actuator in the machine.
         coordinate: number of its coordinate in the leg.
+        number: number of the actuator in the machine.
         home: coordinate of the actuator at the home place, m or rad.
         sense: 1 where it grows with the joint's coordinate, else -1.
         slides: whether it is linear.
     """
 
-    number: int
     coordinate: int
+    number: int
     home: float
     sense: float
     slides: bool
+
+
+ReadingAt = Callable[[int], ActuatorReading]
+"""Makes the reading of an actuator from the number of its coordinate, which is known once its leg is a row."""
 
 
 @dataclass(frozen=True)
@@ -87,13 +92,15 @@ class Unit:
 class LegRow:
     """A leg at its home place as a row of screw motions.
 
+    `home_rows` adds its joints one after another; the properties are asked for only when all of them are there.
+
     Attributes:
         name: name of the leg.
         twists: unit twist of each motion at the base origin [motions][6]; slides per m, turns per rad.
         coordinate: number of the leg's coordinate that each motion follows [motions].
         units: its joints from base to platform.
         slides: whether each coordinate is a length [coordinates].
-        carried: for each element of the leg's chain, the number of motions before it.
+        motions_before: number of the motions before each element of the leg's chain [elements].
     """
 
     name: str
@@ -101,7 +108,7 @@ class LegRow:
     coordinate: list[int] = field(default_factory=list)
     units: list[Unit] = field(default_factory=list)
     slides: list[bool] = field(default_factory=list)
-    carried: list[int] = field(default_factory=list)
+    motions_before: list[int] = field(default_factory=list)
 
     @property
     def size(self) -> int:
@@ -120,32 +127,32 @@ class LegRow:
 
     @cached_property
     def chain(self) -> Chain:
-        """Its motions, once all of them are known."""
+        """Its motions."""
         twists = np.array(self.twists, dtype=float).reshape(1, -1, 6)
         return Chain(twists, tuple(self.coordinate), (-1,) * len(self.twists), self.size)
 
-    def add(self, kind: str, name: str, joints: Sequence[Joint], drive: ActuatorReading | None = None) -> None:
+    def add_joint(self, kind: str, name: str, joints: Sequence[Joint], drive: ActuatorReading | None = None) -> None:
         """Add a joint of one motion, or of several about one point, from its freedoms."""
         first = len(self.twists)
         for joint in joints:
-            self._move(joint, self._coordinate(joint.point is None))
+            self._add_motion(joint, self._new_coordinate(joint.point is None))
         point = joints[0].point if joints[0].point is not None else joints[0].carriage
         axes = tuple(joint.axis for joint in joints)
         self.units.append(Unit(name, kind, first, len(self.twists), point, axes, drive=drive))
 
-    def add_bars(self, name: str, bars: Parallelogram) -> None:
+    def add_parallelogram(self, name: str, bars: Parallelogram) -> None:
         """Add a parallelogram: a turn about its near side and a turn back about its far one, m of arc."""
-        first, coordinate = len(self.twists), self._coordinate(True)
+        first, coordinate = len(self.twists), self._new_coordinate(slides=True)
         near, far, rate = bar_turns(bars)
-        self._move(near, coordinate, rate)
-        self._move(far, coordinate, -rate)
+        self._add_motion(near, coordinate, rate)
+        self._add_motion(far, coordinate, -rate)
         self.units.append(Unit(name, "parallelogram", first, first + 2, bars.near, (bars.normal,), bars=bars))
 
-    def _coordinate(self, slides: bool) -> int:
+    def _new_coordinate(self, slides: bool) -> int:
         self.slides.append(slides)
         return len(self.slides) - 1
 
-    def _move(self, joint: Joint, coordinate: int, rate: float = 1.0) -> None:
+    def _add_motion(self, joint: Joint, coordinate: int, rate: float = 1.0) -> None:
         self.twists.append(rate * np.array(joint.twist(ZERO).components(), dtype=float))
         self.coordinate.append(coordinate)
 
@@ -171,7 +178,9 @@ class HomeRows:
 
 
 def random_coordinates(row: LegRow, length: float) -> Array:
-    """Return random coordinates of a leg around its home place [samples x coordinates], the same ones each time.
+    """Return random coordinates of a leg around its home place [samples x coordinates].
+
+    The seed is fixed, so that the list of errors of a machine never depends on chance.
 
     Args:
         row: the leg.
@@ -196,14 +205,13 @@ def home_rows(machine: Machine) -> HomeRows:
         configuration = machine.configure((0.0,) * chains.size)
         actuators = joint_actuators(chains, [leg.name for leg in configuration.legs])
         readings = [(a.leg, a.offset, a.sign, a.slides) for a in actuators]
-    of_legs: dict[str, list[ActuatorReading]] = {leg.name: [] for leg in configuration.legs}
+    readings_of_leg: dict[str, list[ReadingAt]] = {leg.name: [] for leg in configuration.legs}
     for number, (leg_name, home, sense, slides) in enumerate(readings):
-        # Its coordinate is known once its leg is a row.
-        of_legs[leg_name].append(ActuatorReading(number, -1, home, sense, slides))
+        readings_of_leg[leg_name].append(partial(ActuatorReading, number=number, home=home, sense=sense, slides=slides))
     turn, plane = configuration.platform.rotation, configuration.plane
     absent = () if plane is None else plane.missing_freedoms
     return HomeRows(
-        legs=tuple(_row(leg, iter(of_legs[leg.name])) for leg in configuration.legs),
+        legs=tuple(_row(leg, iter(readings_of_leg[leg.name])) for leg in configuration.legs),
         configuration=configuration,
         rotation=np.array([axis.components() for axis in (turn.x, turn.y, turn.z)], dtype=float).T,
         point=np.array(configuration.platform.translation.components(), dtype=float),
@@ -212,26 +220,28 @@ def home_rows(machine: Machine) -> HomeRows:
     )
 
 
-def _row(leg: Leg, readings: Iterator[ActuatorReading]) -> LegRow:
-    """Return a leg as a row of motions; readings of its actuators, in its order, get their coordinates in the row."""
-    row, names, elements = LegRow(leg.name), _Names(leg.name), list(leg.chain)
+def _row(leg: Leg, readings: Iterator[ReadingAt]) -> LegRow:
+    """Return a leg as a row of motions, with the readings of its actuators, which stand in the order of the leg."""
+    row, names, elements = LegRow(leg.name), _JointNames(leg.name), list(leg.chain)
     place = 0
     while place < len(elements):
-        element, before = elements[place], len(row.twists)
-        row.carried.append(before)
+        element, motions_before = elements[place], len(row.twists)
+        row.motions_before.append(motions_before)
         if isinstance(element, Parallelogram):
-            row.add_bars(names.of(element.name, "parallelogram"), element)
+            row.add_parallelogram(names.free_name(element.name, "parallelogram"), element)
         elif isinstance(element, Joint):
             count = _count_about_point(elements[place:])
             joints = [joint for joint in elements[place : place + count] if isinstance(joint, Joint)]
-            row.add(CENTRES.get(count, _kind(element)), names.of(element.name), joints)
+            row.add_joint(CENTRES.get(count, _kind(element)), names.free_name(element.name), joints)
             place += count - 1
-            row.carried += range(before + 1, before + count)
+            row.motions_before += range(motions_before + 1, motions_before + count)
         elif isinstance(element, Spring) and _is_motion(element, elements[:place]):
-            reading = next(readings) if element.actuated else None
-            if reading is not None:
-                reading = None if is_zero(element.stiffness) else replace(reading, coordinate=row.size)
-            row.add(_kind(element.joint), names.of(element.joint.name or element.part_name), [element.joint], reading)
+            reading_at = next(readings) if element.actuated else None
+            if is_zero(element.stiffness):
+                reading_at = None  # an actuator without stiffness moves freely
+            drive = reading_at(row.size) if reading_at else None
+            name = names.free_name(element.joint.name or element.part_name)
+            row.add_joint(_kind(element.joint), name, [element.joint], drive)
         place += 1
     return row
 
@@ -264,18 +274,22 @@ def _count_about_point(elements: Sequence[Element]) -> int:
     return count
 
 
-class _Names:
+class _JointNames:
     """Names of the joints of a leg, each once."""
 
     def __init__(self, leg: str) -> None:
         self.leg, self.used = leg, set[str]()
 
-    def of(self, title: str, other: str = "") -> str:
-        """Return the name of a joint without that of its leg; another, or one with a number, if it has been used."""
+    def free_name(self, title: str, second_choice: str = "") -> str:
+        """Return the name of a joint without that of its leg; if it is used, the second choice, or one with a number.
+
+        A name is a part of a path, and so it has no dot.
+        """
         name = title.removeprefix(f"{self.leg} ").replace(".", " ") or "joint"
-        name = other if other and name in self.used else name
-        numbered = (f"{name} {number}" for number in range(2, 99))
-        name = name if name not in self.used else next(other for other in numbered if other not in self.used)
+        if second_choice and name in self.used:
+            name = second_choice
+        names = chained([name], (f"{name} {number}" for number in counted(2)))
+        name = next(name for name in names if name not in self.used)
         self.used.add(name)
         return name
 
@@ -298,30 +312,30 @@ class LikeRows:
     chain: Chain
     independent: tuple[int, ...]
 
-    def place(self, coordinates: Sequence[Array], errors: Errors) -> PlacedChain:
-        """Place the legs [legs * n] by coordinates of all legs of the machine [n x coordinates] and their errors."""
+    def place(self, coordinates: Sequence[Array], screws: ErrorScrews) -> PlacedChain:
+        """Place the legs [legs * n] by coordinates [n x coordinates] and error screws of all legs of the machine."""
         count = len(coordinates[self.numbers[0]])
-        places = sorted({behind for k in self.numbers for behind in errors[k]})
-        of_group = {behind: self._errors(behind, errors, count) for behind in places}
-        return self.chain.place(np.concatenate([coordinates[k] for k in self.numbers]), errors=of_group)
+        places = sorted({behind for k in self.numbers for behind in screws[k]})
+        screws_of_group = {behind: self._screws_behind(behind, screws, count) for behind in places}
+        return self.chain.place(np.concatenate([coordinates[k] for k in self.numbers]), errors=screws_of_group)
 
-    def _errors(self, behind: int, errors: Errors, count: int) -> Array:
-        """Return the errors behind so many motions [legs x 6], or [legs * n x 6] if those of a leg differ by pose."""
-        of_legs = [errors[k].get(behind, np.zeros((1, 6))) for k in self.numbers]
-        if any(len(error) > 1 for error in of_legs):
-            of_legs = [np.broadcast_to(error, (count, 6)) for error in of_legs]
-        return np.concatenate(of_legs)
+    def _screws_behind(self, behind: int, screws: ErrorScrews, count: int) -> Array:
+        """Return the screws behind so many motions [legs x 6], or [legs * n x 6] if those of a leg differ by pose."""
+        screws_of_legs = [screws[k].get(behind, np.zeros((1, 6))) for k in self.numbers]
+        if any(len(screw) > 1 for screw in screws_of_legs):
+            screws_of_legs = [np.broadcast_to(screw, (count, 6)) for screw in screws_of_legs]
+        return np.concatenate(screws_of_legs)
 
 
 def like_rows(rows: HomeRows, independent: Sequence[tuple[int, ...]], count: int) -> list[LikeRows]:
-    """Put the legs that are alike together; at many poses each is left by itself.
+    """Put the legs that are alike together; at more than `FEW_POSES` poses each leg is a group by itself.
 
     Args:
         rows: the machine.
         independent: for each leg, numbers of its free screws that are independent, see `closing.Screws`.
         count: number of poses.
     """
-    groups: dict[Any, list[int]] = {}
+    groups: dict[Hashable, list[int]] = {}
     for number, row in enumerate(rows.legs):
         alone = number if count > FEW_POSES else None
         form = alone, tuple(row.coordinate), tuple(row.slides), row.free_coordinates, independent[number]
@@ -330,14 +344,14 @@ def like_rows(rows: HomeRows, independent: Sequence[tuple[int, ...]], count: int
     for numbers in groups.values():
         first = rows.legs[numbers[0]]
         twists = np.concatenate([rows.legs[k].chain.twists for k in numbers])
-        chain = replace(first.chain, twists=twists)
-        result.append(LikeRows(tuple(numbers), first, chain, independent[numbers[0]]))
+        chain_of_legs = replace(first.chain, twists=twists)
+        result.append(LikeRows(tuple(numbers), first, chain_of_legs, independent[numbers[0]]))
     return result
 
 
 def by_leg(groups: Sequence[LikeRows], values: Sequence[Array]) -> list[Array]:
     """Return values of groups [legs * n x ...] as those of each leg [n x ...], in the order of the machine's legs."""
-    parts: dict[int, Array] = {}
-    for group, of_group in zip(groups, values, strict=True):
-        parts.update(zip(group.numbers, np.split(of_group, len(group.numbers)), strict=True))
-    return [parts[number] for number in range(len(parts))]
+    value_of_leg: dict[int, Array] = {}
+    for group, group_values in zip(groups, values, strict=True):
+        value_of_leg.update(zip(group.numbers, np.split(group_values, len(group.numbers)), strict=True))
+    return [value_of_leg[number] for number in range(len(value_of_leg))]

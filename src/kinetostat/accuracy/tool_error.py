@@ -8,6 +8,7 @@ Source: theory (48), (50), (52) and (53).
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,7 +35,7 @@ FEW_STARTS = 24
 SAME_LENGTH = 1e-12
 """Relative growth of the worst case in a step below which it is round-off."""
 MOST_WORST_CASE_STEPS = 100
-"""Steps of that search, which nearly always ends after ten."""
+"""Most steps of that search, which nearly always ends after ten."""
 SOLVED_AT_ONCE = 1024
 """Machines that are solved together: their matrices stay in the cache, and calls of NumPy cost little of the time."""
 
@@ -64,14 +65,14 @@ class Measures:
         matrix = np.stack([np.broadcast_to(row, (count, 6)) for row in self.rows.values()], axis=1)
         return np.asarray(matrix @ twists)
 
-    def places(self, name: str) -> list[int]:
+    def row_numbers(self, name: str) -> list[int]:
         """Return the numbers of the rows that a measure is made of."""
         names = list(self.rows)
         return [names.index(row) for row in self.lengths.get(name, (name,))]
 
     def sizes(self, rows: Array) -> Array:
         """Return all measures as sizes from values of the linear ones [... x rows] -> [... x measures]."""
-        lengths = [np.linalg.norm(rows[..., self.places(name)], axis=-1) for name in self.lengths]
+        lengths = [np.linalg.norm(rows[..., self.row_numbers(name)], axis=-1) for name in self.lengths]
         return np.concatenate([np.abs(rows), *(length[..., None] for length in lengths)], axis=-1)
 
 
@@ -92,35 +93,47 @@ def measures_of(
     rows: dict[str, Array] = {name: np.eye(6)[COMPONENTS.index(name)] for name in components}
     if along is not None:
         rows["along"] = np.concatenate([np.zeros(3), along])
-    remainder, freedoms, parasitic = _correction_remainder(drives, components, length)
+    correction = _correction(drives, components, length)
     lengths = _lengths(components, "")
-    if freedoms < len(components):
-        rows |= {f"{PARASITIC}{name}": remainder[:, COMPONENTS.index(name)] for name in components}
+    if correction.freedoms < len(components):
+        rows |= {f"{PARASITIC}{name}": correction.remainder[:, COMPONENTS.index(name)] for name in components}
         lengths |= _lengths(components, PARASITIC)
-    units = {name: "rad" if _turns(name) else "m" for name in (*rows, *lengths)}
-    return Measures(rows, lengths, units), freedoms, parasitic
+    units = {name: "rad" if _is_angle(name) else "m" for name in (*rows, *lengths)}
+    return Measures(rows, lengths, units), correction.freedoms, correction.parasitic
 
 
-def _turns(name: str) -> bool:
+def _is_angle(name: str) -> bool:
     return name.removeprefix(PARASITIC) in ("rx", "ry", "rz", "rotation")
 
 
 def _lengths(components: Sequence[str], prefix: str) -> dict[str, tuple[str, ...]]:
     """Return the rows of the angle and of the distance, where they have more than one component."""
-    parts = {
-        "rotation": tuple(f"{prefix}{name}" for name in components if _turns(name)),
-        "position": tuple(f"{prefix}{name}" for name in components if not _turns(name)),
+    rows_of_length = {
+        "rotation": tuple(f"{prefix}{name}" for name in components if _is_angle(name)),
+        "position": tuple(f"{prefix}{name}" for name in components if not _is_angle(name)),
     }
-    return {f"{prefix}{name}": members for name, members in parts.items() if len(members) > 1}
+    return {f"{prefix}{name}": rows for name, rows in rows_of_length.items() if len(rows) > 1}
 
 
-def _correction_remainder(
-    drives: Array, components: Sequence[str], length: float
-) -> tuple[Array, int, tuple[str, ...]]:
-    """Return the map from an error to its remainder after small corrections of the actuators [n x 6 x 6], theory (53).
+class _Correction(NamedTuple):
+    """Effect of small corrections of the actuators.
 
-    Corrections take as much away as they can, rotations times the length counting like displacements. Arguments and
-    the other results are those of `measures_of`.
+    Attributes:
+        remainder: the map from an error of the tool to what they leave of it [n x 6 x 6].
+        freedoms: number of freedoms that the actuators move.
+        parasitic: components that none of them moves.
+    """
+
+    remainder: Array
+    freedoms: int
+    parasitic: tuple[str, ...]
+
+
+def _correction(drives: Array, components: Sequence[str], length: float) -> _Correction:
+    """Find what small corrections of the actuators leave of an error of the tool, theory (53).
+
+    Corrections take as much away as they can, rotations times the length counting like displacements. Arguments are
+    those of `measures_of`.
     """
     scale = np.array([length] * 3 + [1.0] * 3)
     motions = drives * scale[:, None]
@@ -134,20 +147,33 @@ def _correction_remainder(
     parasitic = [
         name for name in components if (np.abs(motions[:, COMPONENTS.index(name)]) <= NO_FREEDOM * greatest).all()
     ]
-    return remainder * scale / scale[:, None], int(is_freedom.sum(axis=1).min()), tuple(parasitic)
+    return _Correction(remainder * scale / scale[:, None], int(is_freedom.sum(axis=1).min()), tuple(parasitic))
 
 
-@dataclass(frozen=True)
-class Spread:
-    """The error of the tool at n poses: a column for each measure.
+class FirstOrder(NamedTuple):
+    """The error of the tool at n poses to first order: a column for each measure.
 
     Attributes:
         mean: the error of the average machine, as a size [n x measures].
         rms: root of the mean square over all machines [n x measures].
         rss: the root of the sum of squares of the errors by each limit alone [n x measures].
         worst: the largest error that the limits allow [n x measures].
-        usual: the error within which 95 % of all machines keep [n x measures].
-        everywhere: the error within which 95 % of all machines keep at all these poses [measures].
+    """
+
+    mean: Array
+    rms: Array
+    rss: Array
+    worst: Array
+
+
+@dataclass(frozen=True)
+class Spread:
+    """The error of the tool at n poses with percentiles of random machines: a column for each measure.
+
+    Attributes:
+        mean, rms, rss, worst: see `FirstOrder`.
+        usual: the error within which `USUAL_PERCENT` of all machines keep [n x measures].
+        everywhere: the error within which `USUAL_PERCENT` of all machines keep at all these poses [measures].
     """
 
     mean: Array
@@ -158,26 +184,32 @@ class Spread:
     everywhere: Array
 
 
-def first_order(inputs: RandomInputs, measures: Measures) -> tuple[Array, Array, Array, Array]:
-    """Return mean, root of the mean square, root sum of squares and worst case [n x measures], theory (50).
+def first_order(inputs: RandomInputs, measures: Measures) -> FirstOrder:
+    """Compute the statistics of the error of the tool that need no random machines [n x measures], theory (50).
 
     Args:
         inputs: the variables and their effects.
         measures: the measures.
     """
-    rows = measures.linear(inputs.columns)
-    shift = measures.linear(inputs.shift[:, :, None])[:, :, 0]
-    variances, squares, worst, mean = [], [], [], measures.sizes(shift)
+    rows, shift = _linear_effects(inputs, measures)
+    variances, squared_limits, worst, mean = [], [], [], measures.sizes(shift)
     for name in measures.names:
-        of_measure = rows[:, measures.places(name)]
-        variances.append((of_measure**2 @ inputs.variance).sum(axis=1))
-        squares.append((of_measure**2).sum(axis=(1, 2)))
-        worst.append(_worst(of_measure, shift[:, measures.places(name)], inputs))
+        row_numbers = measures.row_numbers(name)
+        rows_of_measure = rows[:, row_numbers]
+        variances.append((rows_of_measure**2 @ inputs.variance).sum(axis=1))
+        squared_limits.append((rows_of_measure**2).sum(axis=(1, 2)))
+        worst.append(_worst_case(rows_of_measure, shift[:, row_numbers], inputs))
     rms = np.sqrt(mean**2 + np.stack(variances, axis=1))
-    return mean, rms, mean + np.sqrt(np.stack(squares, axis=1)), np.stack(worst, axis=1)
+    rss = mean + np.sqrt(np.stack(squared_limits, axis=1))
+    return FirstOrder(mean, rms, rss, np.stack(worst, axis=1))
 
 
-def _worst(rows: Array, shift: Array, inputs: RandomInputs) -> Array:
+def _linear_effects(inputs: RandomInputs, measures: Measures) -> tuple[Array, Array]:
+    """Return the linear measures per unit of each variable [n x rows x q], and where all variables are 0 [n x rows]."""
+    return measures.linear(inputs.columns), measures.linear(inputs.shift[:, :, None])[:, :, 0]
+
+
+def _worst_case(rows: Array, shift: Array, inputs: RandomInputs) -> Array:
     """Return the largest length that limits allow [n], theory (52): the greatest sum along any direction.
 
     Args:
@@ -191,6 +223,7 @@ def _worst(rows: Array, shift: Array, inputs: RandomInputs) -> Array:
     if size == 1:
         reach = np.abs(rows[:, 0, single]).sum(axis=1) + np.abs(shift[:, 0])
         return np.asarray(reach + sum(np.linalg.norm(rows[:, 0, block], axis=1) for block in joint))
+    # The seed is fixed, so that the answer never depends on chance.
     directions = np.random.default_rng(0).standard_normal((STARTS if count == 1 else FEW_STARTS, size))
     directions = np.broadcast_to(directions / np.linalg.norm(directions, axis=1)[:, None], (count, *directions.shape))
     worst = np.zeros(count)
@@ -212,7 +245,7 @@ def _farthest(directions: Array, rows: Array, shift: Array, single: Integers, jo
 
     Args:
         directions: unit vectors [n x directions x k].
-        rows, shift: see `_worst`.
+        rows, shift: see `_worst_case`.
         single, joint: numbers of the variables that keep a limit each, and of those that keep one together.
     """
     result = np.sign(directions @ rows[:, :, single]) @ np.swapaxes(rows[:, :, single], 1, 2)
@@ -234,24 +267,17 @@ def spread_of(inputs: RandomInputs, measures: Measures, machines: Iterable[Array
     Returns:
         The errors, and of each machine its largest one over all poses [machines x measures].
     """
-    rows, shift = measures.linear(inputs.columns), measures.linear(inputs.shift[:, :, None])[:, :, 0]
+    rows, shift = _linear_effects(inputs, measures)
     count, size, _ = rows.shape
-    flat = rows.reshape(count * size, -1).T
-    sizes = np.concatenate([measures.sizes((slab @ flat).reshape(len(slab), count, size) + shift) for slab in machines])
-    mean, rms, rss, worst = first_order(inputs, measures)
+    effects = rows.reshape(count * size, -1).T
+    slab_sizes = [measures.sizes((slab @ effects).reshape(len(slab), count, size) + shift) for slab in machines]
+    sizes = np.concatenate(slab_sizes)
     largest = sizes.max(axis=1)
-    spread = Spread(
-        mean=mean,
-        rms=rms,
-        rss=rss,
-        worst=worst,
-        usual=np.percentile(sizes, USUAL_PERCENT, axis=0),
-        everywhere=np.percentile(largest, USUAL_PERCENT, axis=0),
-    )
-    return spread, largest
+    usual, everywhere = (np.percentile(over_machines, USUAL_PERCENT, axis=0) for over_machines in (sizes, largest))
+    return Spread(**first_order(inputs, measures)._asdict(), usual=usual, everywhere=everywhere), largest
 
 
-def squares_of(inputs: RandomInputs, measures: Measures) -> Array:
+def variance_by_part(inputs: RandomInputs, measures: Measures) -> Array:
     """Return the variance that each part brings to each measure, summed over the poses [measures x parts].
 
     Source: theory (50).
@@ -260,13 +286,13 @@ def squares_of(inputs: RandomInputs, measures: Measures) -> Array:
     by_variable = np.einsum("nkq,q->kq", rows**2, inputs.variance)
     by_part = np.zeros((len(by_variable), len(inputs.parts)))
     np.add.at(by_part.T, inputs.owner, by_variable.T)
-    return np.stack([by_part[measures.places(name)].sum(axis=0) for name in measures.names])
+    return np.stack([by_part[measures.row_numbers(name)].sum(axis=0) for name in measures.names])
 
 
-def shares(squares: Array) -> Array:
-    """Return squares as shares that add up to 1 in each row; 0 where there is nothing to share."""
-    whole = squares.sum(axis=1, keepdims=True)
-    return np.divide(squares, whole, out=np.zeros_like(squares), where=whole > 0.0)
+def shares(variances: Array) -> Array:
+    """Return variances as shares that add up to 1 in each row; 0 where there is nothing to share."""
+    whole = variances.sum(axis=1, keepdims=True)
+    return np.divide(variances, whole, out=np.zeros_like(variances), where=whole > 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,7 +303,7 @@ class ExactSample(Immutable):
         machines: number of machines.
         failed: number of those that cannot be assembled with their actuators there.
         rms: root of the mean square of each measure [measures].
-        usual: the error within which 95 % of them keep [measures].
+        usual: the error within which `USUAL_PERCENT` of them keep [measures].
         difference: the largest difference of a measure from its first order [measures].
         unexplained: share of the variance that single contributions do not explain [measures]; 0 where nothing varies.
     """
@@ -304,17 +330,17 @@ def exact_sample(machine: Machine, inputs: RandomInputs, measures: Measures, cou
         InputError: none of them can be assembled.
     """
     solved, linear = _solved_and_linear(machine, inputs, measures, count, seed)
-    closed = np.isfinite(solved).all(axis=1)
-    if not closed.any():
+    is_closed = np.isfinite(solved).all(axis=1)
+    if not is_closed.any():
         raise InputError(
             f"{machine.name}: none of the {count:,} machines can be assembled with its actuators there; make the "
             "tolerances smaller."
         )
-    solved, linear = solved[closed], linear[closed]
+    solved, linear = solved[is_closed], linear[is_closed]
     sizes = measures.sizes(solved)
     return ExactSample(
         machines=count,
-        failed=int((~closed).sum()),
+        failed=int((~is_closed).sum()),
         rms=np.sqrt((sizes**2).mean(axis=0)),
         usual=np.percentile(sizes, USUAL_PERCENT, axis=0),
         difference=np.abs(sizes - measures.sizes(linear)).max(axis=0),
@@ -339,15 +365,15 @@ def _solved_and_linear(
             if model is None or len(model) != len(variables):  # one machine for each pose of the model, all the same
                 model = error_model(machine, {path: np.full(len(variables), coordinate)}, len(variables))
             exact, _ = model.displacement(inputs.drawn + variables @ inputs.errors.T)
-            first_order_twists = inputs.shift[0] + variables @ inputs.columns[0].T
+            twists_to_first_order = inputs.shift[0] + variables @ inputs.columns[0].T
             solved.append(measures.linear(exact.T[None])[0].T)
-            linear.append(measures.linear(first_order_twists.T[None])[0].T)
+            linear.append(measures.linear(twists_to_first_order.T[None])[0].T)
     return np.concatenate(solved), np.concatenate(linear)
 
 
 def _unexplained_variance(solved: Array, linear: Array, measures: Measures) -> Array:
     """Return the variance of what the first order leaves, over the variance [machines x rows] -> [measures]."""
-    of_rows = (solved - linear).var(axis=0), solved.var(axis=0)
-    places = [measures.places(name) for name in measures.names]
-    remainder, whole = (np.array([variance[rows].sum() for rows in places]) for variance in of_rows)
+    row_variances = (solved - linear).var(axis=0), solved.var(axis=0)
+    row_numbers = [measures.row_numbers(name) for name in measures.names]
+    remainder, whole = (np.array([variance[rows].sum() for rows in row_numbers]) for variance in row_variances)
     return np.divide(remainder, whole, out=np.zeros_like(remainder), where=whole > 0.0)

@@ -266,3 +266,33 @@ def brackets_by(wrench: Array, twists: Array) -> Array:
     moment, force = wrench[:, None, :3], wrench[:, None, 3:]
     turning, moving = twists[..., :3], twists[..., 3:]
     return np.concatenate([cross(turning, moment) + cross(moving, force), cross(turning, force)], axis=-1)
+
+
+def work_on_exponents(wrenches: Array, carriers: Sequence[Motions], exponents: Array) -> Array:
+    """Return the work of wrenches per unit that is added to the exponents e of small displacements [k x n x 6 x m].
+
+    Where e changes, exp(e) changes on the left by screws of the body that carries it. As e is small, the series
+    1 + B / 2 + B^2 / 6 in its transposed bracket B suffices for these.
+
+    Args:
+        wrenches: m wrenches at the origin [n x 6 x m].
+        carriers: for each of the k displacements, that of the body that carries it [n].
+        exponents: the screws e [k x n x 6].
+    """
+    rotation = np.stack([carrier.rotation for carrier in carriers])
+    translation = np.stack([carrier.translation for carrier in carriers])
+    moments, forces = np.swapaxes(wrenches[:, :3], 1, 2), np.swapaxes(wrenches[:, 3:], 1, 2)
+    moments = moments + cross(forces, translation[..., None, :])
+    in_body = np.concatenate([np.swapaxes(part @ rotation, -2, -1) for part in (moments, forces)], axis=-2)
+    if not exponents.any():
+        return in_body
+    once = _work_on_brackets(exponents, in_body)
+    return np.asarray(in_body + once / 2.0 + _work_on_brackets(exponents, once) / 6.0)
+
+
+def _work_on_brackets(screw: Array, wrenches: Array) -> Array:
+    """Return the work of wrenches [... x 6 x m] on the brackets of a screw [... x 6] with others."""
+    moments, forces = np.swapaxes(wrenches[..., :3, :], -2, -1), np.swapaxes(wrenches[..., 3:, :], -2, -1)
+    rotation, translation = screw[..., None, :3], screw[..., None, 3:]
+    parts = cross(moments, rotation) + cross(forces, translation), cross(forces, rotation)
+    return np.concatenate([np.swapaxes(part, -2, -1) for part in parts], axis=-2)

@@ -58,7 +58,7 @@ def reach_of(inputs: RandomInputs, measures: Measures, measure: str) -> dict[str
 
     A joint that a load presses to one side counts with its whole clearance, twice the limit to one side.
     """
-    rows = measures.linear(inputs.columns)[:, measures.places(measure)]
+    rows = measures.linear(inputs.columns)[:, measures.row_numbers(measure)]
     squares = (rows**2).sum(axis=1) * np.where(inputs.pressed[:, inputs.owner], 4.0, 1.0)
     parts = np.zeros((len(rows), len(inputs.parts)))
     np.add.at(parts.T, inputs.owner, squares.T)

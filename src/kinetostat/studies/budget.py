@@ -24,7 +24,7 @@ from kinetostat.accuracy.tool_error import (
     measures_of,
     shares,
     spread_of,
-    squares_of,
+    variance_by_part,
 )
 from kinetostat.arrays import Array, Codes, Integers, Mask
 from kinetostat.display import number, with_unit
@@ -332,7 +332,7 @@ class _Sums:
             self.inputs, self.measures = inputs, measures
         spread, largest = spread_of(inputs, measures, inputs.machines(self.samples, self.seed))
         self.largest = np.maximum(self.largest, largest)
-        self.squares = self.squares + squares_of(inputs, measures)
+        self.squares = self.squares + variance_by_part(inputs, measures)
         self.reach.append(reach_of(inputs, measures, "position" if self.along is None else "along"))
         return spread
 

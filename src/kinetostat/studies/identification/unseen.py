@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from kinetostat.accuracy.errors import Insertion, MachineError, effects
+from kinetostat.accuracy.errors import Insertion, effects
 from kinetostat.accuracy.rows import random_coordinates
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
@@ -32,8 +32,6 @@ LEAST_NAMED_PART = 0.05
 SAME_EFFECT = 1e-5
 """Share of the effect of a motion that errors of a leg may leave out and yet stand for it: where they can make the
 motion, round-off leaves out 1e-13."""
-NO_ERROR = MachineError(path="", kind="", group="", words="", leg="")
-"""Stands for the error of a motion that is none of the machine's: `effects` reads only where motions are inserted."""
 SAME_SHARE = 1e-6
 """Relative difference below which two unknowns take part in combinations alike."""
 HIDDEN_BY_OTHERS = 1e-6
@@ -201,12 +199,13 @@ def _values_of_leg(observed: Observation, leg: int, twist: Array, at_end: bool) 
     rows, sources = observed.model.rows, observed.model.sources
     row, values = rows.legs[leg], np.zeros(len(observed.error_numbers))
     coordinates = random_coordinates(row, rows.length)
-    motion = (NO_ERROR, (Insertion(leg, len(row.twists) if at_end else 0, twist),))
-    goal = effects(row, rows, [motion], coordinates)[:, 0]
+    motion = Insertion(leg, len(row.twists) if at_end else 0, twist)
+    goal = effects(row, rows, [[motion]], coordinates)[:, 0]
     if np.abs(goal).max(initial=0.0) < SEEN_BY_LEG / rows.length:
         return values
-    errors = {n: sources[number] for n, number in enumerate(observed.error_numbers) if 0 <= number < len(sources)}
-    of_leg = {n: source for n, source in errors.items() if {insertion.leg for insertion in source[1]} == {leg}}
+    numbers = {n: number for n, number in enumerate(observed.error_numbers) if 0 <= number < len(sources)}
+    insertions = {n: sources[number].insertions for n, number in numbers.items()}
+    of_leg = {n: group for n, group in insertions.items() if {insertion.leg for insertion in group} == {leg}}
     if not of_leg:
         return None
     columns = effects(row, rows, [*of_leg.values()], coordinates)
