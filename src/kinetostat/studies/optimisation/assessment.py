@@ -31,8 +31,21 @@ SIGMAS_IN_TOLERANCE = 3.0
 capability index is 1. A deviation beyond is moved to the end."""
 COMMON_SHARE = 0.95
 """Share of the machines that keep within `Scatter.usual`."""
-SEARCH_STREAM, ROBUSTNESS_STREAM = 0, 1
-"""Streams of random numbers: robustness is judged by other machines than those that the search has seen."""
+SEARCH_STREAM, ROBUSTNESS_STREAM = 1, 2
+"""Streams of the machines that are drawn: robustness is judged by others than those that the search has seen."""
+
+
+class RandomPurpose(IntEnum):
+    """Purposes of random numbers, of which none repeats the numbers of another."""
+
+    MANUFACTURE = 0
+    GENERATIONS = 1
+    DESCENTS = 2
+
+
+def random_numbers(problem: Problem, purpose: RandomPurpose, *stream: int) -> np.random.Generator:
+    """A source of random numbers that depends on the seed of a study, a purpose, and a stream of that alone."""
+    return np.random.default_rng([problem.study.optimizer.seed, int(purpose), *stream])
 
 
 class DesignVerdict(IntEnum):
@@ -81,7 +94,9 @@ class Outcome(Immutable):
 
     def selection(self, numbers: Integers) -> "Outcome":
         """The outcome of the designs with these numbers."""
-        return Outcome(*(getattr(self, name)[numbers] for name in vars(self)))
+        return Outcome(
+            self.objectives[numbers], self.constraints[numbers], self.violation[numbers], self.verdict[numbers]
+        )
 
 
 class Assessor:
@@ -94,46 +109,48 @@ class Assessor:
 
     def __call__(self, genes: Array) -> Outcome:
         """Judge designs [designs x variables], each as made by manufacture if the study says so."""
-        return self._in_blocks(genes, self._deviations)
+        return self._in_blocks(genes, self._deviations, machine_count(self._deviations))
 
     def nominal(self, genes: Array) -> Outcome:
         """Judge designs just as they are."""
-        return self._in_blocks(genes, {})
+        return self._in_blocks(genes, {}, 1)
 
     def judge_machines(self, genes: Array, added: Mapping[str, Array]) -> Outcome:
-        """Judge machines made of one design [variables]; `added` has their deviations, SI, by variable [machines]."""
-        count = len(next(iter(added.values())))
-        step = max(1, POINTS_AT_ONCE // self.problem.poses.count)
-        parts = []
-        for start in range(0, count, step):
-            part = {name: values[start : start + step] for name, values in added.items()}
-            repeated = np.repeat(genes[None, :], len(next(iter(part.values()))), axis=0)
-            parts.append(self._judge(self.problem.space.columns(repeated, part), 1))
-        return join_outcomes(parts)
+        """Judge machines made of one design [variables], each by itself.
 
-    def _in_blocks(self, genes: Array, added: Mapping[str, Array]) -> Outcome:
-        """Judge designs block by block, each as machines with the deviations `added`, SI, by variable [machines]."""
-        machines = len(next(iter(added.values()), (0.0,)))
-        step = max(1, POINTS_AT_ONCE // (machines * self.problem.poses.count))
-        return join_outcomes(
-            [self._block(genes[start : start + step], added, machines) for start in range(0, len(genes), step)]
-        )
+        Args:
+            genes: genes of the design.
+            added: deviations of the machines, SI, by variable [machines].
+        """
+        return self._in_blocks(genes[None], added, 1)
 
-    def _block(self, genes: Array, added: Mapping[str, Array], machines: int) -> Outcome:
-        repeated = np.repeat(genes, machines, axis=0)
-        tiled = {name: np.tile(values, len(genes)) for name, values in added.items()}
-        return self._judge(self.problem.space.columns(repeated, tiled), machines)
+    def _in_blocks(self, genes: Array, added: Mapping[str, Array], grouped: int) -> Outcome:
+        """Judge every design as every machine that is made of it, block by block.
+
+        Args:
+            genes: genes of the designs [designs x variables].
+            added: deviations of the machines, SI, by variable [machines]; none for the designs as they are.
+            grouped: number of machines that have one verdict together: all those of a design, or 1.
+        """
+        machines = machine_count(added)
+        total, step = len(genes) * machines, grouped * max(1, POINTS_AT_ONCE // (grouped * self.problem.poses.count))
+        outcomes = []
+        for start in range(0, total, step):
+            design, machine = np.divmod(np.arange(start, min(start + step, total)), machines)
+            deviations_of_block = {name: sizes[machine] for name, sizes in added.items()}
+            outcomes.append(self._judge(self.problem.space.columns(genes[design], deviations_of_block), grouped))
+        return join_outcomes(outcomes)
 
     def _judge(self, columns: Mapping[str, Array], machines: int) -> Outcome:
         """Judge designs by columns in which so many machines of each design follow each other."""
         problem = self.problem
         answers = evaluate_designs(problem.machine, Population(columns, problem.poses.columns), problem.names)
         reached = answers.status == Status.OK
-        pairs = [(o.term, o.sign) for o in problem.objectives] + [(c.term, c.sign) for c in problem.constraints]
-        terms = [self._over_machines(term.values(answers.values, reached), machines, sign > 0) for term, sign in pairs]
-        status = answers.status.reshape(-1, machines * answers.status.shape[1])
-        by_design, count = np.array(terms).T.reshape(len(status), len(pairs)), len(problem.objectives)
-        return _outcome(problem, by_design[:, :count], by_design[:, count:], status)
+        terms, count = [*problem.objectives, *problem.constraints], len(problem.objectives)
+        rows = [self._over_machines(t.term.values(answers.values, reached), machines, t.sign > 0) for t in terms]
+        status_by_design = answers.status.reshape(-1, machines * answers.status.shape[1])
+        by_design = np.array(rows).T.reshape(len(status_by_design), len(terms))
+        return _outcome(problem, by_design[:, :count], by_design[:, count:], status_by_design)
 
     def _over_machines(self, values: Array, machines: int, high_is_bad: bool) -> Array:
         """One number for each design, as the study sums up the numbers of its machines."""
@@ -166,9 +183,10 @@ def _outcome(problem: Problem, objectives: Array, constraints: Array, status: Co
     infinite = ~np.isfinite(objectives).all(axis=1)
     verdict[infinite], violation[infinite] = DesignVerdict.NOT_FINITE, most + 1.0
     counts = np.stack([(status == code).sum(axis=1) for code in Status])
-    missing = problem.poses.required - counts[0] / status.shape[1]
-    lacking = (missing > ROUND_OFF_OF_SHARE) | (counts[0] == 0)
-    verdict[lacking] = VERDICT_BY_STATUS[counts[1:, lacking].argmax(axis=0) + 1]
+    reached, refused = counts[Status.OK], np.where(np.array(Status)[:, None] == Status.OK, 0, counts)
+    missing = problem.poses.required - reached / status.shape[1]
+    lacking = (missing > ROUND_OFF_OF_SHARE) | (reached == 0)
+    verdict[lacking] = VERDICT_BY_STATUS[refused[:, lacking].argmax(axis=0)]
     violation[lacking] = most + 2.0 + missing[lacking]
     return Outcome(np.where(lacking[:, None], np.nan, objectives), constraints, violation, verdict.astype(np.int8))
 
@@ -177,7 +195,12 @@ def join_outcomes(parts: Sequence[Outcome]) -> Outcome:
     """The outcome of the designs of all parts, one part after the other."""
     if len(parts) == 1:
         return parts[0]
-    return Outcome(*(np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])))
+    return Outcome(
+        np.concatenate([part.objectives for part in parts]),
+        np.concatenate([part.constraints for part in parts]),
+        np.concatenate([part.violation for part in parts]),
+        np.concatenate([part.verdict for part in parts]),
+    )
 
 
 def deviations(problem: Problem, samples: int, stream: int) -> dict[str, Array]:
@@ -186,9 +209,9 @@ def deviations(problem: Problem, samples: int, stream: int) -> dict[str, Array]:
     Args:
         problem: the problem, with tolerances and the seed.
         samples: number of machines, the nominal one included.
-        stream: number of the stream of random numbers; streams are independent.
+        stream: `SEARCH_STREAM` or `ROBUSTNESS_STREAM`.
     """
-    rng = np.random.default_rng([problem.study.optimizer.seed, 0, 1 + stream])
+    rng = random_numbers(problem, RandomPurpose.MANUFACTURE, stream)
     tolerated = _tolerated_variables(problem)
     if problem.study.robustness.distribution == "normal":
         drawn = np.clip(rng.standard_normal((samples, len(tolerated))) / SIGMAS_IN_TOLERANCE, -1.0, 1.0)
@@ -196,6 +219,11 @@ def deviations(problem: Problem, samples: int, stream: int) -> dict[str, Array]:
         drawn = rng.uniform(-1.0, 1.0, (samples, len(tolerated)))
     drawn[0] = 0.0
     return {variable.name: variable.tolerance * row for variable, row in zip(tolerated, drawn.T, strict=True)}
+
+
+def machine_count(added: Mapping[str, Array]) -> int:
+    """Return the number of machines that deviations by variable make of a design; 1 where there are none."""
+    return len(next(iter(added.values()), (0.0,)))
 
 
 def _tolerated_variables(problem: Problem) -> list[Variable]:
@@ -219,8 +247,8 @@ class Scatter:
         label, unit: name and unit of the objective.
         nominal: its value for the design itself.
         mean, deviation: mean and standard deviation over all machines that can be judged.
-        usual: the value within which 95 percent of these machines keep.
-        worst: the worst value of all machines, those with every tolerance at an end included.
+        usual: the value within which `COMMON_SHARE` of these machines keep.
+        worst: the worst value of all machines that can be judged, those with every tolerance at an end included.
         samples: the values of the random machines; NaN where one cannot be judged.
     """
 

@@ -19,11 +19,11 @@ import numpy as np
 from kinetostat.arrays import Array, Integers
 from kinetostat.frozen import dataclass
 from kinetostat.late import LateModule
-from kinetostat.studies.optimisation.assessment import Assessor
+from kinetostat.studies.optimisation.assessment import Assessor, RandomPurpose, random_numbers
 from kinetostat.studies.optimisation.log import Log, Step
-from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studies.optimisation.slopes import Local, Surveyor
-from kinetostat.studies.optimisation.terms import PoseTerm
+from kinetostat.studies.optimisation.problem import Constraint, Problem
+from kinetostat.studies.optimisation.slopes import SurveyedDesign, Surveyor
+from kinetostat.studies.optimisation.terms import PoseTerm, Term
 
 if TYPE_CHECKING:
     from scipy import optimize
@@ -79,7 +79,8 @@ class Gradient:
         space, settings = self.problem.space, self.problem.study.optimizer
         if number == 0 and space.holds(space.initial):
             return space.initial
-        rng = np.random.default_rng([settings.seed, 2])
+        rng = random_numbers(self.problem, RandomPurpose.DESCENTS)
+        # The same numbers for every start: each is a row of one Latin hypercube.
         cells = np.stack([rng.permutation(settings.starts) for _ in range(space.size)], axis=1)
         genes = (cells + rng.random(cells.shape))[number] / settings.starts
         return np.where(space.catalogue > 0, np.floor(genes * np.maximum(space.catalogue, 1)), genes)
@@ -97,7 +98,7 @@ class Gradient:
             best_before = log.outcome(log.survivors[:1])
             signed_before = self.problem.objectives[0].sign * best_before.objectives[0, 0]
             is_better = (outcome.violation[best], signed[best]) < (best_before.violation[0], signed_before)
-            kept.insert(1 if is_better else 0, int(log.survivors[0]))
+            kept = [*kept, int(log.survivors[0])] if is_better else [int(log.survivors[0]), *kept]
         return Step(genes, outcome, np.array(kept), {"method": "gradient"})
 
 
@@ -109,39 +110,49 @@ class _Descent:
         problem: the problem, of which the first objective counts.
         survey: computes its derivatives.
         start: genes from which to descend [variables].
-        tried: genes of all designs that were evaluated.
+        tried: genes of all designs that were evaluated, the start first.
     """
 
     problem: Problem
     survey: Surveyor
     start: Array
     tried: list[Array] = field(default_factory=list)
-    _last: tuple[bytes, Local] | None = None
+    _last: tuple[bytes, SurveyedDesign] | None = None
 
     def run(self) -> None:
         """Descend; new rounds where the worst poses have to be chosen again."""
         self.tried.append(self.start)
-        first = self._at(self.start[self.survey.free])
+        genes = self.start[self.survey.free]
+        first = self._at(genes)
         if not first.sound:
             return
-        takes_worst = isinstance(self._term, PoseTerm) and self._term.aggregate.share == 1.0
-        takes_worst = takes_worst and (self.problem.robust is None or self.problem.robust.share == 1.0)
-        kinked = takes_worst and first.reached.size > 1
         scale = abs(self._objective(first)[0]) or 1.0
-        genes, value = self.start[self.survey.free], np.inf
-        for _ in range(MOST_ROUNDS if kinked else 1):
-            genes = self._minimise(genes, scale, kinked)
-            local = self._at(genes)
-            new_value = self._objective(local)[0] / scale if local.sound else np.inf
+        kinked = self._kinked_term if first.reached.size > 1 else None
+        if kinked is None:
+            self._minimise(genes, scale)
+            return
+        value = np.inf
+        for _ in range(MOST_ROUNDS):
+            genes = self._minimise_worst(kinked, genes, scale)
+            design = self._at(genes)
+            new_value = self._objective(design)[0] / scale if design.sound else np.inf
             if not value - new_value > LEAST_GAIN:
                 break
             value = new_value
 
     @property
-    def _term(self) -> Any:
+    def _term(self) -> Term:
         return self.problem.objectives[0].term
 
-    def _at(self, genes: Array) -> Local:
+    @property
+    def _kinked_term(self) -> PoseTerm | None:
+        """The term of the objective, if it is the worst over poses and machines; else None."""
+        term, robust = self._term, self.problem.robust
+        if not isinstance(term, PoseTerm) or term.aggregate.share != 1.0:
+            return None
+        return term if robust is None or robust.share == 1.0 else None
+
+    def _at(self, genes: Array) -> SurveyedDesign:
         """Values and derivatives at a design; the last are kept, because the solver asks for both apart."""
         clipped = np.clip(genes, 0.0, 1.0)
         key = clipped.tobytes()
@@ -152,24 +163,28 @@ class _Descent:
             self._last = key, self.survey(whole)
         return self._last[1]
 
-    def _objective(self, local: Local) -> tuple[float, Array]:
+    def _objective(self, design: SurveyedDesign) -> tuple[float, Array]:
         """The objective with its sign, so that less is better, and its derivatives, SI."""
         sign = self.problem.objectives[0].sign
-        value, slope = local.term(self._term, sign > 0)
+        value, slope = design.term(self._term, sign > 0)
         return sign * value, sign * slope
 
-    def _minimise(self, genes: Array, scale: float, kinked: bool) -> Array:
-        """Minimise the objective from some genes, in units of `scale`; by its epigraph where it has kinks."""
+    def _minimise(self, genes: Array, scale: float) -> Array:
+        """Minimise the objective from some genes, in units of `scale`."""
         bounds = [(0.0, 1.0)] * len(genes)
-        conditions = [self._condition(c.term, c.sign, c.bound, c.scale) for c in self.problem.constraints]
-        if not kinked:
-            return self._solution(lambda x: self._scaled_objective(x, scale), genes, bounds, conditions, PRECISION)
-        # The least t that no value at the worst poses passes: t is one more unknown, and what is minimised.
-        worst = self._at(genes).worst(self._term, WORST_POSES)
-        unknowns = np.append(genes, self._objective(self._at(genes))[0] / scale)
-        conditions.append(_inequality(lambda x: self._below_bound(x, worst, scale)))
-        bounds = [*bounds, (-BLOCKED, BLOCKED)]
-        return self._solution(_last_unknown, unknowns, bounds, conditions, PRECISION_WITH_KINKS)
+        return self._solution(lambda x: self._scaled_objective(x, scale), genes, bounds, [], PRECISION)
+
+    def _minimise_worst(self, term: PoseTerm, genes: Array, scale: float) -> Array:
+        """Minimise the worst value of a term from some genes by its epigraph, in units of `scale`.
+
+        It is the least t that no value at the worst poses passes: t is one more unknown, and what is minimised.
+        """
+        start = self._at(genes)
+        worst = start.worst(term, WORST_POSES)
+        unknowns = np.append(genes, self._objective(start)[0] / scale)
+        bounds = [*[(0.0, 1.0)] * len(genes), (-BLOCKED, BLOCKED)]
+        epigraph = _inequality(lambda x: self._below_bound(term, x, worst, scale))
+        return self._solution(_last_unknown, unknowns, bounds, [epigraph], PRECISION_WITH_KINKS)
 
     def _solution(
         self,
@@ -179,13 +194,21 @@ class _Descent:
         conditions: list[dict[str, Any]],
         precision: float,
     ) -> Array:
-        """The genes of the least value that the solver (sequential quadratic programming) comes to."""
+        """The genes of the least value that the solver (sequential quadratic programming) comes to.
+
+        Args:
+            function: the value that is minimised, and its derivatives.
+            unknowns: start of the unknowns, of which the genes come first.
+            bounds: least and greatest value of each unknown.
+            conditions: conditions beside the constraints of the problem, as `_inequality` makes them.
+            precision: relative change of the value at which the descent ends.
+        """
         solution = optimize.minimize(
             function,
             unknowns,
             jac=True,
             bounds=bounds,
-            constraints=conditions,
+            constraints=[*map(self._condition, self.problem.constraints), *conditions],
             method="SLSQP",
             options={"maxiter": MOST_ITERATIONS, "ftol": precision},
         )
@@ -193,34 +216,33 @@ class _Descent:
 
     def _scaled_objective(self, genes: Array, scale: float) -> tuple[float, Array]:
         """The objective and its derivatives, in units of its size at the start."""
-        local = self._at(genes)
-        if not local.sound:
+        design = self._at(genes)
+        if not design.sound:
             return BLOCKED, np.zeros(len(genes))
-        value, slope = self._objective(local)
+        value, slope = self._objective(design)
         return value / scale, slope / scale
 
-    def _below_bound(self, unknowns: Array, worst: Integers, scale: float) -> tuple[Array, Array]:
-        """By how much the values at the worst poses are below the bound t, the last unknown, and the derivatives."""
-        count, sign = len(unknowns) - 1, self.problem.objectives[0].sign
-        local, rows = self._at(unknowns[:count]), np.zeros((len(worst), count + 1))
-        rows[:, count] = 1.0
-        if not local.sound:
-            return np.full(len(worst), unknowns[count] - BLOCKED), rows
-        values, slopes = local.pieces(self._term, worst)
-        rows[:, :count] = -sign * slopes / scale
-        return unknowns[count] - sign * values / scale, rows
+    def _below_bound(self, term: PoseTerm, unknowns: Array, worst: Integers, scale: float) -> tuple[Array, Array]:
+        """By how much a term at the worst poses is below the bound t, the last unknown, and the derivatives."""
+        genes, bound, sign = unknowns[:-1], unknowns[-1], self.problem.objectives[0].sign
+        design, jacobian = self._at(genes), np.zeros((len(worst), len(unknowns)))
+        jacobian[:, -1] = 1.0
+        if not design.sound:
+            return np.full(len(worst), bound - BLOCKED), jacobian
+        values, slopes = design.pieces(term, worst)
+        jacobian[:, :-1] = -sign * slopes / scale
+        return bound - sign * values / scale, jacobian
 
-    def _condition(self, term: Any, sign: float, bound: float, scale: float) -> dict[str, Any]:
+    def _condition(self, constraint: Constraint) -> dict[str, Any]:
         """A constraint as the solver takes it: a function that must not be negative, and its derivatives."""
-        size = len(self.survey.free)
+        count, sign = len(self.survey.free), constraint.sign
 
-        def room(x: Array) -> tuple[float, Array]:
-            local = self._at(x[:size])
-            slope = np.zeros(len(x))
-            if not local.sound:
-                return -1.0, slope
-            value, slope[:size] = local.term(term, sign > 0)
-            return sign * (bound - value) / scale, -sign * slope / scale
+        def room(unknowns: Array) -> tuple[float, Array]:
+            design, slope = self._at(unknowns[:count]), np.zeros(len(unknowns))
+            if not design.sound:
+                return -1.0, slope  # a design that cannot be judged breaks every constraint, by all of its size
+            value, slope[:count] = design.term(constraint.term, sign > 0)
+            return sign * (constraint.bound - value) / constraint.scale, -sign * slope / constraint.scale
 
         return _inequality(room)
 
@@ -231,6 +253,7 @@ def _inequality(room: Callable[[Array], tuple[Any, Array]]) -> dict[str, Any]:
 
 
 def _last_unknown(x: Array) -> tuple[float, Array]:
+    """The last unknown and its derivatives by all of them, as the solver takes what it minimises."""
     slope = np.zeros(len(x))
     slope[-1] = 1.0
     return float(x[-1]), slope

@@ -18,7 +18,13 @@ from pymoo.operators.mutation.pm import mut_pm
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.frozen import dataclass
 from kinetostat.late import LateModule
-from kinetostat.studies.optimisation.assessment import Assessor, Outcome, join_outcomes
+from kinetostat.studies.optimisation.assessment import (
+    Assessor,
+    Outcome,
+    RandomPurpose,
+    join_outcomes,
+    random_numbers,
+)
 from kinetostat.studies.optimisation.log import Log, Step
 from kinetostat.studies.optimisation.problem import Problem
 
@@ -30,13 +36,16 @@ else:  # a search with one objective sorts nothing
     sorting = LateModule("pymoo.util.nds.non_dominated_sorting")
 
 CROSSED_SHARE = 0.9
-"""Share of the couples whose children are not copies of them; the default of pymoo, as the next three are."""
+"""Share of the couples whose children are not copies of them; a default of pymoo."""
 CROSSED_GENES = 0.5
-"""Share of the genes of a couple that are crossed."""
+"""Share of the genes of a couple that are crossed; a default of pymoo."""
+SWAPPED_GENES = 0.5
+"""Share of the genes that two children exchange, so that neither is like one parent; a default of pymoo for crossed
+genes, and even odds for choices."""
 CROSSOVER_INDEX = 15.0
-"""Index of simulated binary crossover: the larger, the nearer children are to their parents."""
+"""Index of simulated binary crossover: the larger, the nearer children are to their parents; a default of pymoo."""
 MUTATION_INDEX = 20.0
-"""Index of polynomial mutation: the larger, the nearer a mutated design is to its parent."""
+"""Index of polynomial mutation: the larger, the nearer a mutated design is to its parent; a default of pymoo."""
 MOST_MATINGS = 20
 """Greatest number of times that couples are mated to replace children that exist already: a space of few choices may
 have no other designs left."""
@@ -65,7 +74,7 @@ class Genetic:
 
     def step(self, number: int, log: Log) -> Step:
         """One generation: the first is random, around the machine as it is; the others are children of the kept."""
-        rng = np.random.default_rng([self.problem.study.optimizer.seed, 1, number])
+        rng = random_numbers(self.problem, RandomPurpose.GENERATIONS, number)
         if number == 0:
             genes, parents = self._first_designs(rng), np.empty(0, dtype=np.int64)
         else:
@@ -91,6 +100,11 @@ class Genetic:
         """Flags of the variables that are choices of a catalogue [variables]."""
         return np.asarray(self.problem.space.catalogue > 0)
 
+    @property
+    def _upper_bounds(self) -> Array:
+        """Upper bounds of genes for pymoo's operators, which leave genes with equal bounds alone, as choices are."""
+        return np.where(self._choices, 0.0, 1.0)
+
     def _ranks(self, outcome: Outcome) -> Integers:
         """The rank of each design among all, 0 for the best [designs].
 
@@ -98,18 +112,17 @@ class Genetic:
         from others there.
         """
         signed = np.array([objective.sign for objective in self.problem.objectives]) * outcome.objectives
-        if self.crowded:
-            feasible = np.flatnonzero(outcome.violation == 0.0)
-            front, distance = np.full(len(signed), len(signed)), np.zeros(len(signed))
-            crowding = metrics.get_crowding_function("cd")
-            for number, members in enumerate(
-                sorting.NonDominatedSorting().do(signed[feasible]) if feasible.size else []
-            ):
-                front[feasible[members]] = number
-                distance[feasible[members]] = crowding.do(signed[feasible[members]], n_remove=0)
-            order = np.lexsort([-distance, front, outcome.violation])
-        else:
+        if not self.crowded:
             order = np.lexsort([signed[:, 0], outcome.violation])
+        else:
+            feasible = np.flatnonzero(outcome.violation == 0.0)
+            fronts = sorting.NonDominatedSorting().do(signed[feasible]) if feasible.size else []
+            front_number, distance = np.full(len(signed), len(signed)), np.zeros(len(signed))
+            crowding = metrics.get_crowding_function("cd")
+            for number, members in enumerate(fronts):
+                front_number[feasible[members]] = number
+                distance[feasible[members]] = crowding.do(signed[feasible[members]], n_remove=0)
+            order = np.lexsort([-distance, front_number, outcome.violation])  # the last key counts first
         ranks = np.empty(len(order), dtype=np.int64)
         ranks[order] = np.arange(len(order))
         return ranks
@@ -128,9 +141,10 @@ class Genetic:
         """Children of the better parents of random pairs, as many as there are parents [parents x variables]."""
         count, size = parents.shape
         couples = (count + 1) // 2
-        rounds = [rng.permutation(count) for _ in range(-(-4 * couples // count))]
-        pairs = np.concatenate(rounds)[: 4 * couples].reshape(-1, 2)
-        winners = np.where(ranks[pairs[:, 0]] < ranks[pairs[:, 1]], pairs[:, 0], pairs[:, 1])
+        contestants = 4 * couples  # two in a contest for each of both places of a couple
+        contests = -(-contestants // count)  # permutations of all parents that have so many, the last one in part
+        drawn = np.concatenate([rng.permutation(count) for _ in range(contests)])[:contestants].reshape(-1, 2)
+        winners = np.where(ranks[drawn[:, 0]] < ranks[drawn[:, 1]], drawn[:, 0], drawn[:, 1])
         both = parents[winners.reshape(2, couples)]
         children = self._cross(both, rng)
         copied = rng.random(couples) >= CROSSED_SHARE
@@ -140,10 +154,9 @@ class Genetic:
     def _cross(self, both: Array, rng: np.random.Generator) -> Array:
         """Children of couples [2 x couples x variables]; of choices, each comes from either parent."""
         couples, size = both.shape[1:]
-        index, swap = np.full((couples, 1), CROSSOVER_INDEX), np.full((couples, 1), 0.5)
-        upper = np.where(self._choices, 0.0, 1.0)  # equal bounds: the operator leaves choices alone
-        children = cross_sbx(both, np.zeros(size), upper, index, CROSSED_GENES, swap, random_state=rng)
-        exchanged = (rng.random((couples, size)) < 0.5) & self._choices
+        index, swap = np.full((couples, 1), CROSSOVER_INDEX), np.full((couples, 1), SWAPPED_GENES)
+        children = cross_sbx(both, np.zeros(size), self._upper_bounds, index, CROSSED_GENES, swap, random_state=rng)
+        exchanged = (rng.random((couples, size)) < SWAPPED_GENES) & self._choices
         children[:, :, self._choices] = both[:, :, self._choices]
         children[:, exchanged] = both[::-1, exchanged]
         return children
@@ -152,9 +165,8 @@ class Genetic:
         """Change one gene of a design on average, a little; a choice is drawn again [designs x variables]."""
         count, size = genes.shape
         catalogue = self.problem.space.catalogue
-        upper = np.where(self._choices, 0.0, 1.0)
         index, share = np.full(count, MUTATION_INDEX), np.full(count, 1.0 / size)
-        mutated = mut_pm(genes, np.zeros(size), upper, index, share, False, random_state=rng)
+        mutated = mut_pm(genes, np.zeros(size), self._upper_bounds, index, share, False, random_state=rng)
         drawn = np.floor(rng.random((count, size)) * np.maximum(catalogue, 1))
         redrawn = (rng.random((count, size)) < 1.0 / size) & self._choices
         mutated[:, self._choices] = genes[:, self._choices]

@@ -16,7 +16,7 @@ from kinetostat.engine.derivatives import SMALL_SLAB, differentiate
 from kinetostat.engine.points import Population
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
-from kinetostat.studies.optimisation.assessment import SEARCH_STREAM, deviations
+from kinetostat.studies.optimisation.assessment import SEARCH_STREAM, deviations, machine_count
 from kinetostat.studies.optimisation.problem import Problem
 from kinetostat.studies.optimisation.terms import PoseTerm, Term
 from kinetostat.tolerances import ROUND_OFF_OF_SHARE
@@ -41,10 +41,13 @@ LEAST_RIDGE = 0.1
 """Length, in steps along a ridge, below which the ridge is a point, and below which a step gets no further."""
 LEAST_MOVE_SHARE = 0.02
 """A variable belongs to a ridge if it moves by more than this share of the variable that moves most."""
+COMPILE_FROM = 60
+"""Evaluations, each of at most `SMALL_SLAB` points, after which derivatives are compiled. For the paper's machine that
+takes as long as 62 of them by NumPy, for others it took as long as 20 to 50; a ridge takes some 50."""
 
 
 @dataclass(frozen=True)
-class Local:
+class SurveyedDesign:
     """The values and derivatives of one design at every machine that manufacture may make of it, and at every pose.
 
     Attributes:
@@ -69,17 +72,20 @@ class Local:
 
     def term(self, term: Term, high_is_bad: bool) -> tuple[float, Array]:
         """Compute a term and its derivatives by the genes; at a kink, those of the pose or machine that decides."""
-        numbers, slopes = [], []
-        for k, reached in enumerate(self.reached):
-            of_machine = {name: rows[k] for name, rows in self.values.items()}
-            numbers.append(float(term.values({name: of_machine[name][None] for name in term.names}, reached[None])[0]))
-            outer = term.slopes(of_machine, reached)  # derivatives of the term by each quantity
-            slopes.append(sum(np.where(reached, self.slopes[name][:, k], 0.0) @ rate for name, rate in outer.items()))
-        by_machine = np.array(numbers)
-        if self.problem.robust is None or len(by_machine) == 1:
-            return by_machine[0], np.asarray(slopes[0])
-        shares = self.problem.robust.weights(by_machine, np.ones(len(by_machine), dtype=bool), high_is_bad)
-        return float(shares @ by_machine), shares @ np.array(slopes)
+        pairs = [self._term_of_machine(term, machine) for machine in range(len(self.reached))]
+        numbers, slopes = (np.array(column) for column in zip(*pairs, strict=True))
+        if self.problem.robust is None or len(numbers) == 1:
+            return numbers[0], slopes[0]
+        shares = self.problem.robust.weights(numbers, np.ones(len(numbers), dtype=bool), high_is_bad)
+        return float(shares @ numbers), shares @ slopes
+
+    def _term_of_machine(self, term: Term, machine: int) -> tuple[float, Array]:
+        """A term of one machine over its poses, and its derivatives by the genes: the chain rule over quantities."""
+        reached, values = self.reached[machine], {name: rows[machine] for name, rows in self.values.items()}
+        number = float(term.values({name: values[name][None] for name in term.names}, reached[None])[0])
+        rates = term.slopes(values, reached)
+        slopes = (np.where(reached, self.slopes[name][:, machine], 0.0) @ rate for name, rate in rates.items())
+        return number, np.asarray(sum(slopes))
 
     def worst(self, term: PoseTerm, most: int) -> Integers:
         """Return where a term is worst: at most `most` indices into flattened [machines x poses], the worst first."""
@@ -93,11 +99,6 @@ class Local:
         slopes = sum_slopes.reshape(len(sum_slopes), -1)[:, indices].T
         values = term.at_poses(self.values).flat[indices]
         return values, -slopes * (values * values)[:, None] if term.inverse else slopes
-
-
-COMPILE_FROM = 60
-"""Evaluations, each of at most `SMALL_SLAB` points, after which derivatives are compiled. For the paper's machine that
-takes as long as 62 of them by NumPy, for others it took as long as 20 to 50; a ridge takes some 50."""
 
 
 class Surveyor:
@@ -138,16 +139,16 @@ class Surveyor:
             for k in self._free
         ]
 
-    def __call__(self, genes: Array) -> Local:
+    def __call__(self, genes: Array) -> SurveyedDesign:
         """Evaluate one design, given by its genes [variables], with derivatives, at every machine made of it."""
-        return self.at(genes[None])[0]
+        return self.designs(genes[None])[0]
 
-    def at(self, designs: Array) -> list[Local]:
+    def designs(self, genes: Array) -> list[SurveyedDesign]:
         """Evaluate designs as `__call__` does one, all of them together; given by genes [designs x variables]."""
-        problem, count = self.problem, len(designs)
-        machines = len(next(iter(self._deviations.values()), (0.0,)))
+        problem, count = self.problem, len(genes)
+        machines = machine_count(self._deviations)
         added = {name: np.tile(sizes, count) for name, sizes in self._deviations.items()}
-        columns = problem.space.columns(np.repeat(designs, machines, axis=0), added)
+        columns = problem.space.columns(np.repeat(genes, machines, axis=0), added)
         population = Population(columns, problem.poses.columns)
         self._evaluations += -(-population.size // SMALL_SLAB)
         repeated = self._evaluations > COMPILE_FROM
@@ -160,11 +161,11 @@ class Surveyor:
                 slopes[name] = np.array(parts)
         reached = answers.status == Status.OK
         return [
-            Local(
-                problem,
-                {name: values[rows] for name, values in answers.values.items()},
-                reached[rows],
-                {name: slope[:, rows] for name, slope in slopes.items()},
+            SurveyedDesign(
+                problem=problem,
+                values={name: values[rows] for name, values in answers.values.items()},
+                reached=reached[rows],
+                slopes={name: slope[:, rows] for name, slope in slopes.items()},
             )
             for rows in (slice(k * machines, (k + 1) * machines) for k in range(count))
         ]
@@ -220,8 +221,8 @@ def find_ridges(problem: Problem, survey: Surveyor, genes: Array) -> tuple[list[
     if np.abs(objective.rates(point)[0]).max() > MOST_STATIONARY_SLOPE:
         return [], "No ridges are sought, because the search has not converged; refine it with method = hybrid."
     point = objective.settle_across(point)
-    values, vectors = np.linalg.eigh(objective.rates(point)[1])
-    flat = vectors[:, np.abs(values) < FLAT_CURVATURE]
+    curvatures, directions = np.linalg.eigh(objective.rates(point)[1])
+    flat = directions[:, np.abs(curvatures) < FLAT_CURVATURE]
     ridges = [objective.ridge(point, direction) for direction in _aligned_basis(flat).T]
     return [ridge for ridge in ridges if ridge is not None], ""
 
@@ -262,9 +263,9 @@ class _FreeObjective:
         designs = np.tile(self.genes, (len(points), 1))
         designs[:, self.survey.free[self.free]] = points
         values, slopes = np.full(len(points), np.nan), np.full(points.shape, np.nan)
-        for k, local in enumerate(self.survey.at(designs)):
-            if local.sound:
-                values[k], slope = local.term(self.problem.objectives[0].term, True)
+        for k, design in enumerate(self.survey.designs(designs)):
+            if design.sound:
+                values[k], slope = design.term(self.problem.objectives[0].term, high_is_bad=True)
                 slopes[k] = slope[self.free] / (abs(values[k]) or 1.0)
         return values, slopes
 
@@ -283,11 +284,11 @@ class _FreeObjective:
     def settle_across(self, point: Array) -> Array:
         """Return to the best point across the ridge, by Newton's method in the directions that are not flat."""
         for _ in range(SETTLING_STEPS):
-            slope, curvature = self.rates(point)
-            values, vectors = np.linalg.eigh(curvature)
-            steep = np.abs(values) >= FLAT_CURVATURE
-            along = vectors[:, steep]
-            point = point - along @ ((along.T @ np.nan_to_num(slope)) / values[steep])
+            slope, second_derivatives = self.rates(point)
+            curvatures, directions = np.linalg.eigh(second_derivatives)
+            steep = np.abs(curvatures) >= FLAT_CURVATURE
+            across = directions[:, steep]
+            point = point - across @ ((across.T @ np.nan_to_num(slope)) / curvatures[steep])
         return np.clip(point, 0.0, 1.0)
 
     def ridge(self, point: Array, direction: Array) -> Ridge | None:
@@ -298,18 +299,22 @@ class _FreeObjective:
         travel = np.abs(second_end - first_end)
         if travel.max() <= LEAST_RIDGE * RIDGE_STEP:
             return None
-        taking_part = np.flatnonzero(travel > LEAST_MOVE_SHARE * travel.max())
         numbers = self.survey.free[self.free]
-        ends = []
-        for point in (first_end, second_end):
-            whole = self.genes.copy()
-            whole[numbers] = point
-            ends.append(self.problem.space.values(whole)[numbers][taking_part])
-        names = tuple(self.problem.space.searched_variables[numbers[k]].name for k in taking_part)
-        return Ridge(names, tuple(ends[0].tolist()), tuple(ends[1].tolist()), float(max(first_change, second_change)))
+        moving = numbers[travel > LEAST_MOVE_SHARE * travel.max()]
+        designs = np.tile(self.genes, (2, 1))
+        designs[:, numbers] = first_end, second_end
+        start, end = self.problem.space.values(designs)[:, moving].tolist()
+        names = tuple(self.problem.space.searched_variables[number].name for number in moving)
+        return Ridge(names, tuple(start), tuple(end), float(max(first_change, second_change)))
 
     def _follow(self, point: Array, direction: Array, level: float) -> tuple[Array, float]:
-        """Return the last point of the ridge in one direction, and the greatest relative change up to there."""
+        """Return the last point of a ridge in one direction, and the greatest relative change up to there.
+
+        Args:
+            point: a point of the ridge [free].
+            direction: direction of the first step, of length 1; each later step goes on as the one before it went.
+            level: the objective on the ridge, SI.
+        """
         greatest = 0.0
         for _ in range(MOST_RIDGE_STEPS):
             step = RIDGE_STEP * _room(point, direction)
@@ -326,10 +331,11 @@ class _FreeObjective:
 
 
 def _room(point: Array, direction: Array) -> float:
-    """Return the share of a step that stays within the bounds."""
+    """Return the share of a step along a ridge that stays within the bounds of all genes."""
+    ahead = np.where(direction > 0.0, 1.0, 0.0)  # the bound towards which each gene moves
     with np.errstate(divide="ignore", invalid="ignore"):
-        lengths = np.where(direction == 0.0, np.inf, (np.where(direction > 0.0, 1.0, 0.0) - point) / direction)
-    return float(np.clip((lengths / RIDGE_STEP).min(initial=1.0), 0.0, 1.0))
+        distances = np.where(direction == 0.0, np.inf, (ahead - point) / direction)
+    return float(np.clip((distances / RIDGE_STEP).min(initial=1.0), 0.0, 1.0))
 
 
 def ridge_sentences(ridges: Sequence[Ridge], problem: Problem) -> list[str]:
