@@ -94,9 +94,8 @@ import os, signal, sys
 from pathlib import Path
 from kinetostat.studies.optimisation.assessment import Assessor
 from kinetostat.studies.optimisation.problem import load_problem
-from kinetostat.studies.optimisation.log import front_of
+from kinetostat.studies.optimisation.log import RowFile, front_of
 from kinetostat.studies.optimisation.search import search_into
-from kinetostat.studies.result_file import RowFile
 from kinetostat.studies.study_folder import StudyFolder
 
 left = [{done}]

@@ -4,8 +4,8 @@ from math import ceil
 from pathlib import Path
 
 from kinetostat.frozen import dataclass
-from kinetostat.studies.optimisation.log import ROWS
-from kinetostat.studies.result_file import RowFile, frame_is_whole
+from kinetostat.studies.optimisation.log import ROWS, RowFile
+from kinetostat.studies.result_file import frame_is_whole
 from kinetostat.studies.storage import LIST, differing, is_damaged, read_list
 from kinetostat.studies.stored_grid import LAYOUT, damaged_chunks, partial_of
 from kinetostat.studies.study_folder import (

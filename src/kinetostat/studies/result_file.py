@@ -1,4 +1,4 @@
-"""A NetCDF file larger than memory, filled run by run, and a file of rows. Which runs are done is known elsewhere.
+"""A NetCDF file larger than memory, filled run by run. Which runs are done is known elsewhere.
 
 Every variable is one contiguous block, reserved when the file is made; later only numbers are written into it. An
 interruption therefore breaks no structure, no second copy has to be assembled, and the file does not depend on the runs
@@ -11,8 +11,7 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from math import prod
 from pathlib import Path
-from types import TracebackType
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypedDict
 
 import h5netcdf
 import h5py
@@ -24,18 +23,35 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.storage import KEPT_SENTENCE, settle, writing
 from kinetostat.studies.study_folder import checksum
 
-ROW_NUMBER = np.dtype("<f8")
-"""Numbers in a file of rows: float64, little-endian."""
 SPARE_BYTES = 1 << 30
 """Bytes that are left free on a disk, 1 GiB: other programs fail on one that is full to the last byte."""
 BYTES_AT_A_TIME = 1 << 24
-"""Bytes that are filled at a time: little memory, and so many that the time of a call does not count."""
+"""Bytes that are filled at a time, 16 MiB: little memory, and so many that the time of a call does not count."""
 VALUES_OF_A_FIGURE = 400
 """Values of an axis that a figure can show: one for every two or three of its pixels."""
 STATUS = "status"
 """Name of the variable that says of each point whether and how it is answered, int8; all others are float64."""
+FLOAT_BYTES = 8
+"""Bytes of a value of every variable but the status."""
 UNKNOWN = -1
 """Status of points that are not computed yet."""
+
+
+class Layout(TypedDict):
+    """The places of the numbers in a file, as plain data that a folder keeps.
+
+    Attributes:
+        points: number of points.
+        size: size of the file, bytes.
+        offsets: start of the block of each variable by its name, bytes, in the order in which the variables are written
+            and their checksums are taken: quantities, then the status.
+        frame: checksum of all that is in no block.
+    """
+
+    points: int
+    size: int
+    offsets: dict[str, int]
+    frame: str
 
 
 def check_space(folder: Path, points: int, quantities: int) -> None:
@@ -45,7 +61,7 @@ def check_space(folder: Path, points: int, quantities: int) -> None:
         InputError: it does not.
     """
     place = next(place for place in (folder.absolute(), *folder.absolute().parents) if place.exists())
-    needed = points * (ROW_NUMBER.itemsize * quantities + _width(STATUS))
+    needed = points * (FLOAT_BYTES * quantities + _width(STATUS))
     free = shutil.disk_usage(place).free
     if needed + SPARE_BYTES > free:
         raise InputError(
@@ -60,12 +76,8 @@ def create(
     dims: Sequence[str],
     quantities: Mapping[str, Mapping[str, Any]],
     about_status: Mapping[str, Any],
-) -> dict[str, Any]:
-    """Make a file in which no point is computed yet.
-
-    Returns:
-        Its layout, as plain data for `frame_is_whole` and `run_checksum`: points, size, where the block of each
-        variable starts (the status last), and the checksum of all that is in no block.
+) -> Layout:
+    """Make a file in which no point is computed yet, and return its layout.
 
     Args:
         path: path of the file; one that is there is replaced.
@@ -95,12 +107,16 @@ def create(
             offsets = _offsets(path, variables)
             _fill_status(stream, offsets[STATUS], points)
             settle(stream)
-            layout = {"points": points, "size": path.stat().st_size, "offsets": offsets}
-            return {**layout, "frame": _frame_checksum(stream, layout)}
+            size = path.stat().st_size
+            frame = _frame_checksum(stream, points, size, offsets)
+            return Layout(points=points, size=size, offsets=offsets, frame=frame)
 
 
 def _try_space(path: Path, size: int) -> None:
-    """Fail where no file of this size can be made, because the HDF5 library would end the process there."""
+    """Fail where no file of this size can be made, because the HDF5 library would end the process there.
+
+    Only on Linux the space is really taken: elsewhere the system makes a file with holes, and the check is in vain.
+    """
     with path.open("wb") as stream:
         if sys.platform == "linux":
             os.posix_fallocate(stream.fileno(), 0, size)
@@ -130,27 +146,28 @@ def _offsets(path: Path, names: Iterable[str]) -> dict[str, int]:
         return {name: file[name].id.get_offset() for name in names}
 
 
-def frame_is_whole(path: Path, layout: Mapping[str, Any]) -> bool:
+def frame_is_whole(path: Path, layout: Layout) -> bool:
     """Tell whether all of a file but its numbers is as it was made: its size, names, attributes and coordinates."""
     try:
         with path.open("rb") as stream:
-            return path.stat().st_size == layout["size"] and _frame_checksum(stream, layout) == layout["frame"]
+            parts = layout["points"], layout["size"], layout["offsets"]
+            return path.stat().st_size == layout["size"] and _frame_checksum(stream, *parts) == layout["frame"]
     except OSError:
         return False
 
 
-def _frame_checksum(stream: BinaryIO, layout: Mapping[str, Any]) -> str:
-    """Return the checksum of all bytes between the blocks."""
-    blocks = sorted((offset, offset + layout["points"] * _width(name)) for name, offset in layout["offsets"].items())
+def _frame_checksum(stream: BinaryIO, points: int, size: int, offsets: Mapping[str, int]) -> str:
+    """Return the checksum of all bytes before, between and behind the blocks; arguments as in `Layout`."""
+    blocks = sorted((offset, offset + points * _width(name)) for name, offset in offsets.items())
     result, place = "0", 0
-    for start, end in [*blocks, (layout["size"], layout["size"])]:
+    for start, end in [*blocks, (size, size)]:
         stream.seek(place)
         result, place = checksum(stream.read(start - place), result), end
     return result
 
 
-def run_checksum(stream: BinaryIO, layout: Mapping[str, Any], run: range) -> str:
-    """Return the checksum of a run of points in a file: of each variable in the order of its layout."""
+def run_checksum(stream: BinaryIO, layout: Layout, run: range) -> str:
+    """Return the checksum of a run of points in a file: of each variable in the order of the layout."""
     result = "0"
     for name, offset in layout["offsets"].items():
         stream.seek(offset + run.start * _width(name))
@@ -158,9 +175,7 @@ def run_checksum(stream: BinaryIO, layout: Mapping[str, Any], run: range) -> str
     return result
 
 
-def copy_run(
-    source: BinaryIO, layout: Mapping[str, Any], target: BinaryIO, target_layout: Mapping[str, Any], run: range
-) -> None:
+def copy_run(source: BinaryIO, layout: Layout, target: BinaryIO, target_layout: Layout, run: range) -> None:
     """Copy a run of points from a file to another one, each with its layout."""
     for name, offset in layout["offsets"].items():
         source.seek(offset + run.start * _width(name))
@@ -170,15 +185,15 @@ def copy_run(
 
 def _width(name: str) -> int:
     """Bytes of a value of a variable."""
-    return 1 if name == STATUS else ROW_NUMBER.itemsize
+    return 1 if name == STATUS else FLOAT_BYTES
 
 
 class ResultFile:
     """An open file, to be filled."""
 
     def __init__(self, path: Path, names: Iterable[str]) -> None:
-        """Open a file that `create` has made, with the quantities of these names."""
-        self._offsets = _offsets(path, (*names, STATUS))
+        """Open a file that `create` has made, with the quantities of these names in the order of its layout."""
+        self._offsets = _offsets(path, (*names, STATUS))  # in the order of the layout, so that checksums agree
         self._path = path
         self._stream = path.open("r+b")
 
@@ -216,48 +231,3 @@ def thinned_dataset(path: Path) -> xr.Dataset:
     with xr.open_dataset(path, engine="h5netcdf") as dataset:
         steps = {dim: slice(None, None, -(-size // VALUES_OF_A_FIGURE)) for dim, size in dataset.sizes.items()}
         return dataset.isel(steps).load()
-
-
-class RowFile:
-    """An open file of rows of one width."""
-
-    def __init__(self, path: Path, width: int) -> None:
-        self._path, self._width = path, width
-        with writing(path, KEPT_SENTENCE):
-            path.touch()
-            self._stream = path.open("r+b")
-
-    def __enter__(self) -> "RowFile":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._stream.close()
-
-    def read(self, start: int, count: int, check: str | None) -> AnyArray | None:
-        """Return some rows [count x width], from number `start` on; None if they are damaged or not there.
-
-        Args:
-            start, count: the rows.
-            check: their checksum; None if they were written without it.
-        """
-        size = self._width * ROW_NUMBER.itemsize
-        self._stream.seek(start * size)
-        data = self._stream.read(count * size)
-        if len(data) < count * size or check not in (None, checksum(data)):
-            return None
-        return np.frombuffer(data, dtype=ROW_NUMBER).reshape(count, self._width).astype(float)
-
-    def write(self, start: int, rows: AnyArray) -> str:
-        """Put rows at number `start`, and return their checksum; when this returns they are on the disk.
-
-        Raises:
-            InputError: the disk is full or failing.
-        """
-        data = np.ascontiguousarray(rows, dtype=ROW_NUMBER).data.cast("B")
-        with writing(self._path, KEPT_SENTENCE):
-            self._stream.seek(start * self._width * ROW_NUMBER.itemsize)
-            self._stream.write(data)
-            settle(self._stream)
-        return checksum(data)

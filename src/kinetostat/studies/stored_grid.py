@@ -25,6 +25,7 @@ from kinetostat.spec.errors import InputError
 from kinetostat.studies.datasets import ABOUT_STATUS, GridQuestion, about_quantity
 from kinetostat.studies.result_file import (
     UNKNOWN,
+    Layout,
     ResultFile,
     check_space,
     copy_run,
@@ -41,9 +42,6 @@ GRID_STUDY_VERSION = 1
 """Version of the question that a folder keeps."""
 LAYOUT = "layout"
 """Key under which the question of a folder has the layout of its file."""
-
-Layout = dict[str, Any]
-"""Places of the numbers in a file, and the checksum of everything else: plain data from `result_file.create`."""
 
 
 @dataclass(frozen=True)
@@ -173,7 +171,7 @@ def _begin_or_continue(question: GridQuestion, study: StudyFolder, final: Path) 
     """Begin the study, or take its work from the folder; the layout is None in a folder from before layouts."""
     work = in_chunks(question.machine, question.grid, question.names)
     question_now = _as_record(question, final.name)
-    stored = study.question(question_now, _in_this_version)
+    stored = study.checked_question(question_now, _in_this_version)
     if stored is None:
         layout = _create(question, final)
         study.begin({**question_now, "chunk": work.chunk, LAYOUT: layout})

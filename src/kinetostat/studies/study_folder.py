@@ -163,13 +163,13 @@ class StudyFolder:
     """
 
     def __init__(self, path: Path, history: BinaryIO) -> None:
-        """Begin; the process has the lock of the history, which is open to be read and written."""
+        """Take over a folder; the process has the lock of its history, which is open to be read and written."""
         self.path, self.damaged, self._history = path, 0, history
 
-    def question(self, wanted: Record, restated: Callable[[Record], Record]) -> Record | None:
+    def checked_question(self, wanted: Record, restated: Callable[[Record], Record]) -> Record | None:
         """Return the question that this folder answers, or None where it has none yet; check that it is the wanted one.
 
-        A damaged or missing copy of it is written again.
+        A file of the question that is damaged or missing is written again.
 
         Args:
             wanted: the question that is asked.

@@ -1,23 +1,29 @@
-"""All designs that were judged, in order, and what each step of a search kept of them. Nothing is judged here.
+"""All designs that were judged, in order, what each step of a search kept of them, and the file in which they lie.
 
-A step depends on the log before it and on the seed alone. So a search that was stopped goes on from its last whole
-step, and ends as if it had never been stopped.
+Nothing is judged here. A step depends on the log before it and on the seed alone. So a search that was stopped goes on
+from its last whole step, and ends as if it had never been stopped.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field
+from pathlib import Path
+from types import TracebackType
 from typing import Any
 
 import numpy as np
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
-from kinetostat.arrays import Array, Integers
+from kinetostat.arrays import AnyArray, Array, Integers
 from kinetostat.frozen import dataclass
 from kinetostat.studies.optimisation.assessment import Outcome, join_outcomes
 from kinetostat.studies.optimisation.problem import Problem
+from kinetostat.studies.storage import KEPT_SENTENCE, settle, writing
+from kinetostat.studies.study_folder import checksum
 
 ROWS = "designs.bin"
 """Name of the file with the rows of a log in the folder of a study."""
+ROW_NUMBER = np.dtype("<f8")
+"""Numbers in that file: float64, little-endian."""
 
 
 @dataclass(frozen=True)
@@ -113,10 +119,7 @@ class Log:
 
 def record_of(log: Log, step: Step) -> dict[str, Any]:
     """Return the note about a step: its number, how many designs it judged, which it kept, and how good these are."""
-    problem, is_logged = log.problem, step.kept < log.count
-    outcomes = join_outcomes([log.outcome(step.kept[is_logged]), step.outcome])
-    new_places = is_logged.sum() + step.kept - log.count
-    kept = outcomes.selection(np.where(is_logged, np.cumsum(is_logged) - 1, new_places))
+    problem, kept = log.problem, _kept_outcome(log, step)
     feasible = kept.violation == 0.0
     notes: dict[str, Any] = {}
     if len(problem.objectives) == 1 and feasible.any():
@@ -131,6 +134,14 @@ def record_of(log: Log, step: Step) -> dict[str, Any]:
         **notes,
         **step.notes,
     }
+
+
+def _kept_outcome(log: Log, step: Step) -> Outcome:
+    """The outcome of the designs that a step kept, in its order: of the log before it, and of its own."""
+    is_logged = step.kept < log.count
+    outcomes = join_outcomes([log.outcome(step.kept[is_logged]), step.outcome])
+    own_places = is_logged.sum() + step.kept - log.count  # behind those of the log
+    return outcomes.selection(np.where(is_logged, np.cumsum(is_logged) - 1, own_places))
 
 
 def best_feasible(log: Log) -> Integers:
@@ -179,3 +190,48 @@ def knee_of(log: Log, front: Integers) -> int:
 def _signed_objectives(log: Log) -> Array:
     """Objectives of all designs, with signs so that less is better."""
     return np.array([objective.sign for objective in log.problem.objectives]) * log.outcome().objectives
+
+
+class RowFile:
+    """An open file of rows of one width, to which each step of a search adds its designs."""
+
+    def __init__(self, path: Path, width: int) -> None:
+        self._path, self._width = path, width
+        with writing(path, KEPT_SENTENCE):
+            path.touch()
+            self._stream = path.open("r+b")
+
+    def __enter__(self) -> "RowFile":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stream.close()
+
+    def read(self, start: int, count: int, check: str | None) -> AnyArray | None:
+        """Return some rows [count x width], from number `start` on; None if they are damaged or not there.
+
+        Args:
+            start, count: the rows.
+            check: their checksum; None if they were written without it.
+        """
+        size = self._width * ROW_NUMBER.itemsize
+        self._stream.seek(start * size)
+        data = self._stream.read(count * size)
+        if len(data) < count * size or check not in (None, checksum(data)):
+            return None
+        return np.frombuffer(data, dtype=ROW_NUMBER).reshape(count, self._width).astype(float)
+
+    def write(self, start: int, rows: AnyArray) -> str:
+        """Put rows at number `start`, and return their checksum; when this returns they are on the disk.
+
+        Raises:
+            InputError: the disk is full or failing.
+        """
+        data = np.ascontiguousarray(rows, dtype=ROW_NUMBER).data.cast("B")
+        with writing(self._path, KEPT_SENTENCE):
+            self._stream.seek(start * self._width * ROW_NUMBER.itemsize)
+            self._stream.write(data)
+            settle(self._stream)
+        return checksum(data)

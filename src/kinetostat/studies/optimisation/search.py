@@ -5,13 +5,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from kinetostat.display import ENGINEERING
 from kinetostat.frozen import dataclass
-from kinetostat.late import LateModule
 from kinetostat.machine.loading import as_toml, build
 from kinetostat.machine.saving import as_file
 from kinetostat.spec.arguments import checked
@@ -20,7 +19,7 @@ from kinetostat.spec.study import read_study
 from kinetostat.studies.optimisation.assessment import Assessor
 from kinetostat.studies.optimisation.descents import Gradient
 from kinetostat.studies.optimisation.generations import Genetic
-from kinetostat.studies.optimisation.log import ROWS, Log, Step, record_of
+from kinetostat.studies.optimisation.log import ROW_NUMBER, ROWS, Log, RowFile, Step, record_of
 from kinetostat.studies.optimisation.problem import Problem, problem_of
 from kinetostat.studies.optimisation.result import Result, result_of
 from kinetostat.studies.study_folder import (
@@ -32,11 +31,6 @@ from kinetostat.studies.study_folder import (
     read_question,
     study_folder,
 )
-
-if TYPE_CHECKING:
-    from kinetostat.studies import result_file
-else:
-    result_file = LateModule("kinetostat.studies.result_file")
 
 STUDY_VERSION = 1
 """Version of the question in a study folder, as far as this module writes it."""
@@ -167,7 +161,7 @@ def search_into(
         _begin_or_check(assess.problem, study, log)
         noted = study.records()
         last_noted = max(noted, default=-1) + study.damaged  # a damaged line was that of a step, too
-        with result_file.RowFile(folder / ROWS, log.width) as file:
+        with RowFile(folder / ROWS, log.width) as file:
             while len(log.steps) < method.steps:
                 if _read_step(study, file, noted.get(len(log.steps)), log):
                     continue
@@ -188,7 +182,7 @@ def search_into(
         return log
 
 
-def _read_step(study: StudyFolder, file: "result_file.RowFile", record: Record | None, log: Log) -> bool:
+def _read_step(study: StudyFolder, file: RowFile, record: Record | None, log: Log) -> bool:
     """Add the next step from the folder to the log, if it is there without damage, and return whether it was."""
     rows = file.read(log.count, record["designs"], record.get(DATA)) if record else None
     if record is None or rows is None:
@@ -209,7 +203,7 @@ def _take(method: Method, log: Log) -> None:
 def _begin_or_check(problem: Problem, study: StudyFolder, log: Log) -> None:
     """Begin the folder of a study, or check that it holds this one."""
     question = question_of(problem, log.width)
-    stored = study.question(question, _restate)
+    stored = study.checked_question(question, _restate)
     if stored is None:
         (study.path / ROWS).unlink(missing_ok=True)
         study.begin(question | {"machine file": as_file(problem.machine)})
@@ -257,9 +251,8 @@ def kept_log(problem: Problem, folder: Path, record: Record) -> Log:
         record: the note about the step.
     """
     log = Log(problem)
-    number = result_file.ROW_NUMBER
-    count = (folder / ROWS).stat().st_size // (log.width * number.itemsize)
-    rows = np.memmap(folder / ROWS, number, "r", shape=(count, log.width))[record["kept"]].astype(float)
+    count = (folder / ROWS).stat().st_size // (log.width * ROW_NUMBER.itemsize)
+    rows = np.memmap(folder / ROWS, ROW_NUMBER, "r", shape=(count, log.width))[record["kept"]].astype(float)
     log.add(rows, {**record, "kept": list(range(len(rows)))})
     return log
 
