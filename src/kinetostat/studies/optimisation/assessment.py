@@ -223,7 +223,7 @@ def deviations(problem: Problem, samples: int, stream: int) -> dict[str, Array]:
 
 def machine_count(added: Mapping[str, Array]) -> int:
     """Return the number of machines that deviations by variable make of a design; 1 where there are none."""
-    return len(next(iter(added.values()), (0.0,)))
+    return len(next(iter(added.values()))) if added else 1
 
 
 def _tolerated_variables(problem: Problem) -> list[Variable]:

@@ -121,9 +121,17 @@ class Problem(Immutable):
     @property
     def differentiable(self) -> bool:
         """Whether there are derivatives, and few enough of them to be kept."""
-        smooth = all(item.term.differentiable for item in self.objectives)
-        smooth = smooth and without_derivatives(self.machine, self.names, self.paths) is None
-        return smooth and bool((self.space.catalogue == 0).any()) and self.points <= MOST_DIFFERENTIATED
+        return (
+            all(objective.term.differentiable for objective in self.objectives)
+            and without_derivatives(self.machine, self.names, self.paths) is None
+            and self.space.has_continuous
+            and self.points <= MOST_DIFFERENTIATED
+        )
+
+    @property
+    def descends(self) -> bool:
+        """Whether its method uses derivatives."""
+        return self.method in ("gradient", "hybrid")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -204,7 +212,8 @@ def problem_of(study: StudyFile, machine: Machine) -> Problem:
         robust=_robust(study, space),
         method=study.optimizer.method or ("nsga2" if len(objectives) > 1 else "genetic"),
     )
-    _check(problem)
+    _check_method(problem)
+    _check_size(problem)
     return problem
 
 
@@ -232,18 +241,17 @@ def _objective(machine: Machine, table: ObjectiveTable, poses: PoseSet, where: s
         raise InputError(
             f'{where}: neither a larger nor a smaller {name} is better in general; add goal = "minimize" or "maximize".'
         )
-    small = goal == "minimize"
-    return Objective(read_term(machine, table, poses, small, where), 1.0 if small else -1.0)
+    wants_less = goal == "minimize"
+    return Objective(read_term(machine, table, poses, wants_less, where), 1.0 if wants_less else -1.0)
 
 
 def _constraint(machine: Machine, table: ConstraintTable, poses: PoseSet, where: str) -> Constraint:
     if (table.at_least is None) == (table.at_most is None):
         raise InputError(f"{where} needs either at_least or at_most.")
-    upper = table.at_most is not None
-    term = read_term(machine, table, poses, upper, where)
-    written = table.at_most if table.at_most is not None else table.at_least
-    key = "at_most" if upper else "at_least"
-    return Constraint(term, 1.0 if upper else -1.0, value_of(term.unit, written, f"{where}.{key}"))
+    is_upper = table.at_most is not None
+    key, written = ("at_most", table.at_most) if is_upper else ("at_least", table.at_least)
+    term = read_term(machine, table, poses, is_upper, where)
+    return Constraint(term, 1.0 if is_upper else -1.0, value_of(term.unit, written, f"{where}.{key}"))
 
 
 def _robust(study: StudyFile, space: Space) -> Aggregate | None:
@@ -255,32 +263,38 @@ def _robust(study: StudyFile, space: Space) -> Aggregate | None:
     return parse_aggregate(text, "robustness.objective")
 
 
-def _check(problem: Problem) -> None:
-    """Refuse a method that cannot solve the problem, and problems that are too large."""
-    settings, several = problem.study.optimizer, len(problem.objectives) > 1
+def _check_method(problem: Problem) -> None:
+    """Refuse a method that cannot solve the problem."""
+    several = len(problem.objectives) > 1
     if several != (problem.method == "nsga2"):
         advice = "nsga2" if several else "genetic, gradient or hybrid"
         raise InputError(
             f"optimizer.method is {problem.method}, but the study has {len(problem.objectives)} objectives: "
             f"take {advice}{'' if several else ', or add an objective'}."
         )
+    if not problem.descends:
+        return
+    refuse_without_derivatives(problem.machine, problem.names, problem.paths)
+    stepped = [term.label for term in problem.terms if not term.differentiable]
+    if stepped:
+        raise InputError(f"{stepped[0]} changes in steps and has no gradient; take optimizer.method = genetic.")
+    if problem.method == "gradient" and not problem.space.has_continuous:
+        raise InputError("all variables are choices, along which there is no gradient; take method = genetic.")
+
+
+def _check_size(problem: Problem) -> None:
+    """Refuse a problem with more poses of a design, or more designs, than are kept."""
+    settings = problem.study.optimizer
     if problem.points > MOST_POINTS:
         raise InputError(
             f"one design has {problem.poses.count:,} poses of {problem.study.robustness.search_samples:,} machines; at "
             f"most {MOST_POINTS:,} in all: lower the counts of [poses] or robustness.search_samples."
         )
-    if problem.method in ("gradient", "hybrid"):
-        if problem.points > MOST_DIFFERENTIATED:
-            raise InputError(
-                f"one design has {problem.points:,} poses, of which derivatives are not kept beyond "
-                f"{MOST_DIFFERENTIATED:,}; lower the counts of [poses], or take optimizer.method = genetic."
-            )
-        stepped = [term.label for term in problem.terms if not term.differentiable]
-        refuse_without_derivatives(problem.machine, problem.names, problem.paths)
-        if stepped:
-            raise InputError(f"{stepped[0]} changes in steps and has no gradient; take optimizer.method = genetic.")
-        if problem.method == "gradient" and not (problem.space.catalogue == 0).any():
-            raise InputError("all variables are choices, along which there is no gradient; take method = genetic.")
+    if problem.descends and problem.points > MOST_DIFFERENTIATED:
+        raise InputError(
+            f"one design has {problem.points:,} poses, of which derivatives are not kept beyond "
+            f"{MOST_DIFFERENTIATED:,}; lower the counts of [poses], or take optimizer.method = genetic."
+        )
     if problem.method != "gradient" and settings.population * settings.generations > MOST_EVALUATIONS:
         raise InputError(
             f"{settings.population:,} designs in {settings.generations:,} generations are more than the "

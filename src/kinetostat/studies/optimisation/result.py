@@ -31,6 +31,7 @@ from kinetostat.studies.sensitivity import relative_sensitivity
 DESIGN_SUFFIX = ", optimised"
 """End of the name of a machine that is a design of a study."""
 INFEASIBLE = "No feasible design was found: {}. Widen the bounds, ease the constraints, or change [poses]."
+"""The answer without a feasible design, with the numbers of designs by their verdicts."""
 
 
 @dataclass(frozen=True)
@@ -107,6 +108,7 @@ class Result(Immutable):
 
     @property
     def best(self) -> int:
+        """Number of the best design in the log; there is one only where the study is solved."""
         return int(self.front[self.knee])
 
     @cached_property
@@ -173,15 +175,15 @@ def _as_it_is(problem: Problem) -> Array:
 def _explain(assess: Assessor, result: Result) -> Result:
     """The result with everything that is asked of its best design."""
     problem = assess.problem
-    compiled = problem.method in ("gradient", "hybrid")  # these searches have compiled the derivatives already
-    survey = Surveyor(problem, compiled) if problem.differentiable else None
-    ridges, reason = _ridges(problem, survey, result.genes)
+    # A search that descends has compiled the derivatives already.
+    survey = Surveyor(problem, searching=problem.descends) if problem.differentiable else None
+    ridges, why_no_ridges = _ridges(problem, survey, result.genes)
     return replace(
         result,
         compliance_changes=tuple(_compliance_changes(problem, result.machine)),
         influences=tuple(_influences(problem, survey, result.genes)) if survey else (),
         ridges=tuple(ridges),
-        no_ridges=reason,
+        no_ridges=why_no_ridges,
         robustness=robustness_of(assess, result.genes),
     )
 
@@ -199,8 +201,8 @@ def _compliance_changes(problem: Problem, machine: Machine) -> list[ComplianceCh
     """The greatest compliances over the poses that are reached, of the machine as it was and of another design."""
     components = problem.machine.family.component_names
     names = [name for name in GROUPS["compliance"] if QUANTITIES[name].components[0] in components]
-    numbers = [values(design) for design in (problem.machine, machine)]
-    columns = {path: np.array([design[path] for design in numbers], dtype=float) for path in problem.space.paths}
+    designs = [values(design) for design in (problem.machine, machine)]
+    columns = {path: np.array([design[path] for design in designs], dtype=float) for path in problem.space.paths}
     answers = evaluate_designs(problem.machine, Population(columns, problem.poses.columns), names)
     reached = answers.status == Status.OK
     worst = {name: answers.values[name].max(axis=1, where=reached, initial=-np.inf) for name in names}
@@ -213,16 +215,16 @@ def _compliance_changes(problem: Problem, machine: Machine) -> list[ComplianceCh
 
 def _influences(problem: Problem, survey: Surveyor, genes: Array) -> list[VariableInfluence]:
     """The effects of the continuous variables at a design; none where its derivatives are not sound."""
-    surveyed, bounds, design = survey(genes), at_bounds(problem, genes), problem.space.values(genes)
-    if not surveyed.sound:
+    design, bounds, settings = survey(genes), at_bounds(problem, genes), problem.space.values(genes)
+    if not design.sound:
         return []
-    terms = [surveyed.term(objective.term, high_is_bad=objective.sign > 0) for objective in problem.objectives]
-    levels = np.array([level for level, _ in terms])
+    pairs = [design.term(objective.term, high_is_bad=objective.sign > 0) for objective in problem.objectives]
+    objectives = np.array([value for value, _ in pairs])
     influences = []
     for place, number in enumerate(survey.free):
         variable = problem.space.searched_variables[number]
-        slopes = tuple(float(slope[place]) / (variable.high - variable.low) for _, slope in terms)
-        scale = 1.0 if variable.quantity.kind == "angle" else float(design[number])
-        percents = tuple(relative_sensitivity(np.array(slopes), scale, levels).tolist())
+        slopes = tuple(float(slope[place]) / (variable.high - variable.low) for _, slope in pairs)
+        size = 1.0 if variable.quantity.kind == "angle" else float(settings[number])
+        percents = tuple(relative_sensitivity(np.array(slopes), size, objectives).tolist())
         influences.append(VariableInfluence(variable.name, slopes, percents, bounds[number]))
     return influences

@@ -34,6 +34,8 @@ from kinetostat.studies.study_folder import (
 
 STUDY_VERSION = 1
 """Version of the question in a study folder, as far as this module writes it."""
+OPTIMISATION, ROW_WIDTH, MACHINE_FILE = "optimisation", "numbers in a row", "machine file"
+"""Keys of that question: the study file, the width of the rows of its log, and the machine as people write it."""
 
 Watch = Callable[[int, int, float | None], None]
 """Called with (steps done, steps in all, best objective so far) after each step."""
@@ -160,17 +162,18 @@ def search_into(
         log, method = Log(assess.problem), method_of(assess)
         _begin_or_check(assess.problem, study, log)
         noted = study.records()
-        last_noted = max(noted, default=-1) + study.damaged  # a damaged line was that of a step, too
+        noted_steps = max(noted, default=-1) + 1 + study.damaged  # a damaged line was that of a step, too
         with RowFile(folder / ROWS, log.width) as file:
             while len(log.steps) < method.steps:
                 if _read_step(study, file, noted.get(len(log.steps)), log):
                     continue
-                if len(log.steps) <= last_noted:
+                if len(log.steps) < noted_steps:
                     if not log.repaired:  # the history begins again with the steps before the first damaged one
                         study.keep(log.steps)
                     log.repaired += 1
                 start = log.count
                 _take(method, log)
+                # The rows are on the disk before the note that they are there, so that no note is without its rows.
                 log.steps[-1][DATA] = file.write(start, log.rows[start:])
                 study.note(log.steps[-1])
                 watch(len(log.steps), method.steps, log.steps[-1].get("best"))
@@ -206,13 +209,13 @@ def _begin_or_check(problem: Problem, study: StudyFolder, log: Log) -> None:
     stored = study.checked_question(question, _restate)
     if stored is None:
         (study.path / ROWS).unlink(missing_ok=True)
-        study.begin(question | {"machine file": as_file(problem.machine)})
+        study.begin(question | {MACHINE_FILE: as_file(problem.machine)})
     log.unchecked = stored is not None and not has_checksums(stored)
 
 
 def _restate(stored: Record) -> Record:
     """A stored question as this version writes it."""
-    return question_of(_problem_of(stored, "study.json"), stored["numbers in a row"])
+    return question_of(_problem_of(stored, "study.json"), stored[ROW_WIDTH])
 
 
 def stored_problem(folder: Path) -> Problem:
@@ -222,14 +225,14 @@ def stored_problem(folder: Path) -> Problem:
         InputError: it is not the folder of an optimisation.
     """
     question = read_question(folder)
-    if not {"optimisation", "machine"} <= question.keys():
+    if not {OPTIMISATION, "machine"} <= question.keys():
         raise InputError(f'"{folder}" is not the folder of an optimisation; give a study file, or such a folder.')
     return _problem_of(question, str(folder))
 
 
 def _problem_of(question: Record, origin: str) -> Problem:
-    machine = build(question.get("machine file") or question["machine"], origin)
-    return problem_of(read_study(question["optimisation"], origin), machine)
+    machine = build(question.get(MACHINE_FILE) or question["machine"], origin)
+    return problem_of(read_study(question[OPTIMISATION], origin), machine)
 
 
 def begin_search(problem: Problem, folder: Path) -> None:
@@ -239,7 +242,7 @@ def begin_search(problem: Problem, folder: Path) -> None:
         InputError: it cannot be written.
     """
     with study_folder(folder) as study:
-        study.begin(question_of(problem, Log(problem).width) | {"machine file": as_file(problem.machine)})
+        study.begin(question_of(problem, Log(problem).width) | {MACHINE_FILE: as_file(problem.machine)})
 
 
 def kept_log(problem: Problem, folder: Path, record: Record) -> Log:
@@ -264,7 +267,7 @@ def question_of(problem: Problem, width: int) -> Record:
         "kinetostat": version("kinetostat"),
         # How results are shown does not part a study from the one that it continues.
         "machine": as_toml(replace(problem.machine, display=ENGINEERING)),
-        "optimisation": problem.study.model_dump(mode="json", by_alias=True, exclude_none=True),
-        "numbers in a row": width,
+        OPTIMISATION: problem.study.model_dump(mode="json", by_alias=True, exclude_none=True),
+        ROW_WIDTH: width,
     }
     return json.loads(json.dumps(question))

@@ -17,7 +17,7 @@ from kinetostat.display import ENGINEERING, Display
 from kinetostat.frozen import dataclass
 from kinetostat.late import LateModule
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import Parameter, find, values
+from kinetostat.machine.parameters import POSE, Parameter, find, values
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.immutable import Immutable
@@ -34,6 +34,8 @@ VALUE_DIGITS = 6
 """Digits of the value of a variable for people, as in fields of the studio: what a file says comes back as it is."""
 MOST_NODES = 1_000_000
 """Greatest number of nodes of a grid of poses, of which the workspace is a part."""
+NO_CHOICE = -1.0
+"""Takes the place of the number of a choice where a machine has none of the choices of a catalogue."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class Variable:
         labels: names of the choices.
         fixed: whether it keeps its value, so that only its tolerance counts.
         tolerance: greatest deviation by manufacture, SI.
-        initial: the machine's own value, SI; of a catalogue, the number of the choice, -1 if it is none of them.
+        initial: the machine's own value, SI; of a catalogue, the number of the choice, or `NO_CHOICE`.
     """
 
     fields: tuple[Parameter, ...]
@@ -87,7 +89,7 @@ class Variable:
     def in_words(self, value: float, display: Display = ENGINEERING) -> str:
         """A value as people read it: a label, or a number with its unit."""
         if self.choices is not None:
-            return self.labels[int(value)] if value >= 0 else "none of the choices"
+            return "none of the choices" if value == NO_CHOICE else self.labels[int(value)]
         return display.show(value, self.unit, RIGID, VALUE_DIGITS)
 
 
@@ -111,6 +113,11 @@ class Space:
         """Number of choices of each searched variable; 0 where it has bounds."""
         return np.array([0 if v.choices is None else len(v.choices) for v in self.searched_variables])
 
+    @property
+    def has_continuous(self) -> bool:
+        """Whether any searched variable has bounds, so that designs change continuously along it."""
+        return bool((self.catalogue == 0).any())
+
     @cached_property
     def paths(self) -> tuple[str, ...]:
         """Leaf paths of all numbers that the variables set, those of fixed ones last."""
@@ -119,6 +126,7 @@ class Space:
 
     @cached_property
     def _bounds(self) -> tuple[Array, Array]:
+        """Lower bounds and widths of the ranges of genes, SI [variables each]; the gene of a choice is its number."""
         pairs = [(0.0, 1.0) if v.choices is not None else (v.low, v.high - v.low) for v in self.searched_variables]
         lows, spans = np.array(pairs).T
         return lows, spans
@@ -250,7 +258,7 @@ def _catalogue(machine: Machine, table: VariableTable, fields: tuple[Parameter, 
         labels=tuple(labels),
         fixed=table.fixed,
         tolerance=0.0,
-        initial=float(matching[0]) if matching else -1.0,
+        initial=float(matching[0]) if matching else NO_CHOICE,
     )
 
 
@@ -298,7 +306,8 @@ class PoseSet(Immutable):
 
     @property
     def count(self) -> int:
-        return len(next(iter(self.columns.values()), (0.0,)))
+        """Number of poses; 1 for the machine's own, which has no columns."""
+        return len(next(iter(self.columns.values()))) if self.columns else 1
 
 
 def read_poses(machine: Machine, table: PosesTable) -> PoseSet:
@@ -338,6 +347,7 @@ def _row(machine: Machine, row: Mapping[str, float | str], where: str) -> dict[s
 
 
 def _grid(machine: Machine, table: PosesTable) -> PoseSet:
+    """The nodes of a grid, or those of them that lie in the workspace of the machine as it is."""
     question = datasets.grid_question(machine, table.over or [], ["singularity_margin"])
     if question.grid.size > MOST_NODES:
         raise InputError(f"[poses] has {question.grid.size:,} nodes; at most {MOST_NODES:,} are allowed.")
@@ -345,7 +355,8 @@ def _grid(machine: Machine, table: PosesTable) -> PoseSet:
     size = "x".join(str(count) for count in question.grid.shape)
     if table.within is None:
         return PoseSet(columns, table.required, _box(question), f"a grid of {size} poses")
-    inside = workspace.workspace(machine, table.over or [], table.where).dataset["verdict"].values.ravel() == 0
+    answer = workspace.workspace(machine, table.over or [], table.where)
+    inside = answer.dataset["verdict"].values.ravel() == answer.verdicts.index(workspace.INSIDE)
     if not inside.any():
         raise InputError("[poses]: no node of the grid lies in the workspace of the machine; widen over or where.")
     kept = {path: column[inside] for path, column in columns.items()}
@@ -354,7 +365,8 @@ def _grid(machine: Machine, table: PosesTable) -> PoseSet:
 
 
 def _box(question: "datasets.GridQuestion") -> tuple[float, str] | None:
-    if not all(field.startswith("pose.") for field in question.fields):
+    """Volume of a grid and its unit; None where any axis is not a coordinate of the pose."""
+    if not all(field.startswith(POSE) for field in question.fields):
         return None
     spans = [abs(float(axis.values[-1] - axis.values[0])) for axis in question.grid.axes]
     return prod(spans), workspace.unit_product([str(question.labels[dim].attrs["units"]) for dim in question.dims])

@@ -8,7 +8,8 @@ import difflib
 import math
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, Protocol, TypeAlias
+from itertools import combinations_with_replacement
+from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
@@ -30,14 +31,29 @@ WORST, MEAN = "worst", "mean"
 """Words of the other aggregates: the worst of all values, and their mean."""
 SUMS = {"compliance_sum": "compliance", "stiffness_sum": "stiffness"}
 """Weighted sums of the diagonal of C (eq. 40) and of K (eq. 39)."""
+
+
+class _DirectionalTerm(NamedTuple):
+    """A term along a direction (under a force) or about it (under a moment), with all other motions free.
+
+    Attributes:
+        letter: letter before an axis in the names of the components of C: r for rotations, else none.
+        inverse: whether the reciprocal of the compliance is meant.
+        unit: its SI unit.
+    """
+
+    letter: str
+    inverse: bool
+    unit: str
+
+
 ALONG = {
-    "compliance_along": ("", False, "m/N"),
-    "stiffness_along": ("", True, "N/m"),
-    "compliance_about": ("r", False, "rad/(N·m)"),
-    "stiffness_about": ("r", True, "N·m/rad"),
+    "compliance_along": _DirectionalTerm("", inverse=False, unit="m/N"),
+    "stiffness_along": _DirectionalTerm("", inverse=True, unit="N/m"),
+    "compliance_about": _DirectionalTerm("r", inverse=False, unit="rad/(N·m)"),
+    "stiffness_about": _DirectionalTerm("r", inverse=True, unit="N·m/rad"),
 }
-"""Terms along a direction (under a force) and about it (under a moment), with all other motions free: the letter before
-the components of C, whether the reciprocal is meant, and the SI unit."""
+"""Terms that need a direction, by their names."""
 STROKE, VOLUME = "leg_stroke", "workspace_volume"
 """Terms of all poses together: of the lengths of legs, and of the poses that are reached."""
 AXES = "xyz"
@@ -83,11 +99,11 @@ class Aggregate:
         if self.share == 1.0:
             return np.where(count > 0, sign * badness.max(axis=-1), np.nan)
         ordered = np.sort(badness, axis=-1)
-        low, high, part = self._neighbours(count, values.shape[-1])
-        lower, upper = (np.take_along_axis(ordered, place[..., None], -1)[..., 0] for place in (low, high))
-        with np.errstate(invalid="ignore"):
-            between = np.where(part > 0.0, lower + part * (upper - lower), lower)
-        return np.where(count > 0, sign * between, np.nan)
+        rank = self._rank(count, values.shape[-1])
+        lower, upper = (np.take_along_axis(ordered, place[..., None], -1)[..., 0] for place in (rank.below, rank.above))
+        with np.errstate(invalid="ignore"):  # of two infinite neighbours no difference is needed
+            percentile = np.where(rank.part > 0.0, lower + rank.part * (upper - lower), lower)
+        return np.where(count > 0, sign * percentile, np.nan)
 
     def weights(self, values: Array, counted: Mask, high_is_bad: bool) -> Array:
         """The weights of values in the number taken of them [n]; of equally bad ones, the first has all weight."""
@@ -96,21 +112,29 @@ class Aggregate:
             return counted / max(int(count), 1)
         weights = np.zeros(len(values))
         order = np.argsort(np.where(counted, values if high_is_bad else -values, -np.inf), kind="stable")
-        low, high, part = self._neighbours(count, len(values))
-        weights[order[low]] += 1.0 - float(part)
-        weights[order[high]] += float(part)
+        rank = self._rank(count, len(values))
+        weights[order[rank.below]] += 1.0 - float(rank.part)
+        weights[order[rank.above]] += float(rank.part)
         return weights
 
-    def _neighbours(self, count: AnyArray, size: int) -> tuple[Any, Any, Any]:
-        """Places of the values next to the percentile in increasing order, and the share of the way between them.
+    def _rank(self, count: AnyArray, size: int) -> "_Rank":
+        """The place of the percentile among values in increasing order of badness.
 
         Args:
             count: number of values that count; all others come first in that order.
             size: number of all values.
         """
-        rank = np.minimum((size - count) + (self.share or 0.0) * np.maximum(count - 1, 0), size - 1)
-        low = np.floor(rank).astype(int)
-        return low, np.minimum(low + 1, size - 1), rank - low
+        place = np.minimum((size - count) + (self.share or 0.0) * np.maximum(count - 1, 0), size - 1)
+        below = np.floor(place).astype(int)
+        return _Rank(below, np.minimum(below + 1, size - 1), place - below)
+
+
+class _Rank(NamedTuple):
+    """A place between two values of an ordered row: their numbers, and the share of the way from the first on."""
+
+    below: Any
+    above: Any
+    part: Any
 
 
 def parse_aggregate(text: str, where: str) -> Aggregate:
@@ -280,8 +304,8 @@ def usual_goal(name: str) -> Goal | None:
         return "maximize"
     if name not in QUANTITIES:
         return "minimize"
-    better = QUANTITIES[name].better
-    return None if better is None else "maximize" if better == "more" else "minimize"
+    goals: dict[str | None, Goal | None] = {"more": "maximize", "less": "minimize", None: None}
+    return goals[QUANTITIES[name].better]
 
 
 def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: bool, where: str) -> Term:
@@ -313,8 +337,8 @@ def read_term(machine: Machine, table: TermTable, poses: PoseSet, high_is_bad: b
     if name in SUMS:
         unit, weights = "SI", _sum_weights(machine, name, table.weights, where)
     elif name in ALONG:
-        letter, inverse, unit = ALONG[name]
-        weights = _direction_weights(machine, letter, table.direction, where)
+        inverse, unit = ALONG[name].inverse, ALONG[name].unit
+        weights = _direction_weights(machine, ALONG[name].letter, table.direction, where)
     else:
         refuse_absent(state_of(machine), [name])
         unit = QUANTITIES[name].unit
@@ -369,12 +393,13 @@ def _direction_weights(
         raise InputError(f"{where} needs a direction, e.g. direction = [0, 0, 1].")
     n = [component / size for component in direction]
     weights: dict[str, float] = {}
-    for i in range(3):
-        for j in range(i, 3):
-            weight = n[i] * n[j] * (1.0 if i == j else 2.0)
-            parts = [f"{letter}{AXES[i]}"] if i == j else [f"{letter}{AXES[i]}", f"{letter}{AXES[j]}"]
-            if weight and not all(part in machine.family.component_names for part in parts):
-                raise InputError(f"{where}.direction leaves the plane of {machine.name}, which has no {parts[-1]}.")
-            if weight:
-                weights["_".join(["compliance", *parts])] = weight
+    for i, k in combinations_with_replacement(range(3), 2):
+        weight = n[i] * n[k] * (1.0 if i == k else 2.0)  # C is symmetric: entries beside the diagonal count twice
+        if weight == 0.0:
+            continue
+        components = dict.fromkeys([f"{letter}{AXES[i]}", f"{letter}{AXES[k]}"])
+        for component in components:
+            if component not in machine.family.component_names:
+                raise InputError(f"{where}.direction leaves the plane of {machine.name}, which has no {component}.")
+        weights["_".join(["compliance", *components])] = weight
     return weights
