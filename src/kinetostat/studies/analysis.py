@@ -13,7 +13,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -58,6 +58,8 @@ from kinetostat.tolerances import (
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from kinetostat.studies.requirements import Verdict
 
 AXES = ("base", "platform")
 """Axes in which results are given."""
@@ -131,7 +133,7 @@ class Analysis(AnswerInState):
     jacobian_condition: float | None = None
     characteristic_length: float | None = None
     directions: tuple[DirectionalStiffness, ...] = ()
-    requirements: tuple[Any, ...] = ()
+    requirements: "tuple[Verdict, ...]" = ()
 
     def __repr__(self) -> str:
         return f"<Analysis of {self.machine.name!r}: {self.status.word}, components {' '.join(self.components)}>"
@@ -236,106 +238,114 @@ def analyze(machine: Machine | MachineState, axes: str = "base") -> Analysis:
     """
     choice(axes, AXES, "axes")
     state = state_of(machine)
-    machine, response, status = state.machine, state.response, state.status
+    response, components = state.response, state.machine.family.components
     configuration = response.configuration
     turn = IDENTITY if axes == "base" else configuration.platform.rotation.inverse()
-    if status is not Status.OK:
-        names, facts = machine.family.component_names, _facts_without_answer(state, turn)
-        return Analysis(state=state, status=status, message=state.refusal, components=names, axes=axes, **facts)
+    unanswered = Analysis(
+        state=state,
+        status=state.status,
+        message=state.refusal,
+        components=state.machine.family.component_names,
+        axes=axes,
+    )
+    if state.status is not Status.OK:
+        return _without_answer(unanswered, turn)
     # Screws are cleaned before they are turned, where an exact zero is easy to tell, and once more after it, because
     # turning adds round-off of its own.
     response = replace(response, statics=clean_statics(response.statics))
     statics = clean_statics(_turned_statics(response.statics, turn))
     stiffness, compliance = stiffness_matrix(statics), compliance_matrix(statics)
-    kept = machine.family.components
-    compliance_rows, stiffness_rows = _rows(compliance, kept), _rows(stiffness, kept)
+    stiffness_rows, compliance_rows = _rows(stiffness, components), _rows(compliance, components)
     all_springs, length = springs(configuration), float(configuration.length)
-    facts = _facts(state)
     extremes = conditioning(response.legs, length, response.guide)
-    load = load_case(response, statics, turn, kept)
-    indices = indices_of(stiffness_rows, compliance_rows, length, kept)
+    indices = indices_of(stiffness_rows, compliance_rows, length, components)
     weakest = {name: softest(block, name, all_springs, statics) for name, block in (indices.free or {}).items()}
-    return Analysis(
-        state,
-        status,
-        _message(state, response, facts["rigid"], facts["free"], stiffness_rows is not None, load),
-        components=machine.family.component_names,
-        axes=axes,
+    answer = replace(
+        _with_place(unanswered),
         stiffness=stiffness_rows,
         compliance=compliance_rows,
-        stiffness_diagonal=np.array([float(stiffness.entry(i, i)) for i in kept]),
-        compliance_diagonal=np.array([float(compliance.entry(i, i)) for i in kept]),
+        stiffness_diagonal=np.array([float(stiffness.entry(i, i)) for i in components]),
+        compliance_diagonal=np.array([float(compliance.entry(i, i)) for i in components]),
         rank=_rank(response, statics, compliance_rows is None),
-        attribution=contributions(all_springs, statics, stiffness, compliance, kept),
+        attribution=contributions(all_springs, statics, stiffness, compliance, components),
         indices=indices,
         softest={name: direction for name, direction in weakest.items() if direction is not None},
         mobility=state.mobility,
         internal_loads=internal_loads([leg.name for leg in configuration.legs], response.legs, length, response.guide),
-        load=load,
+        load=load_case(response, statics, turn, components),
         wrench_condition=float(extremes[0] / extremes[-1]),
         jacobian_condition=_jacobian_condition(response, length),
-        **facts,
     )
+    return replace(answer, message=_message(answer, response.statics))
 
 
-def _facts(state: MachineState) -> dict[str, Any]:
-    """Return the fields of an `Analysis` that are known wherever a machine has a place, answer or not."""
-    response = state.free
-    configuration = response.configuration
+def _with_place(analysis: Analysis) -> Analysis:
+    """Return an analysis with the fields that are known wherever a machine has a place, answer or not."""
+    state = analysis.state
+    response, configuration = state.free, state.free.configuration
     all_springs, rotation = springs(configuration), configuration.platform.rotation
     axes = [axis.components() for axis in (rotation.x, rotation.y, rotation.z)]
     position = configuration.platform.translation.components()
-    return {
-        "platform": (np.array(position, dtype=float), np.array(axes, dtype=float).T),
-        "rigid": tuple(spring.name for spring in all_springs if math.isinf(spring.stiffness)),
-        "free": tuple(spring.name for spring in all_springs if spring.stiffness == 0.0),
-        "masses": tuple(moving_masses(state.machine, configuration)),
-        "actuators": tuple(replace(a, coordinate=float(a.coordinate)) for a in stand(state.machine, state.joints)),
-        "singularity_margin": float(response.singularity_margin),
-        "leg_singularity_margin": min((float(leg.singularity_margin) for leg in response.legs), default=1.0),
-        "platform_singularity_margin": float(response.statics.singularity_margin),
-        "characteristic_length": float(configuration.length),
-    }
+    return replace(
+        analysis,
+        platform=(np.array(position, dtype=float), np.array(axes, dtype=float).T),
+        rigid=tuple(spring.name for spring in all_springs if math.isinf(spring.stiffness)),
+        free=tuple(spring.name for spring in all_springs if spring.stiffness == 0.0),
+        masses=tuple(moving_masses(state.machine, configuration)),
+        actuators=tuple(replace(a, coordinate=float(a.coordinate)) for a in stand(state.machine, state.joints)),
+        singularity_margin=float(response.singularity_margin),
+        leg_singularity_margin=min((float(leg.singularity_margin) for leg in response.legs), default=1.0),
+        platform_singularity_margin=float(response.statics.singularity_margin),
+        characteristic_length=float(configuration.length),
+    )
 
 
-def _facts_without_answer(state: MachineState, turn: Rotation) -> dict[str, Any]:
-    """Return the fields of an `Analysis` that are known at a pose without an answer; none where it has no place.
+def _without_answer(analysis: Analysis, turn: Rotation) -> Analysis:
+    """Return an analysis with what is known at a pose without an answer; nothing more where the machine has no place.
 
     `turn` leads from base axes to those of K and C.
     """
+    state = analysis.state
     if Status(int(state.free.joint_status)) is not Status.OK or state.status in PLACELESS:
-        return {}
+        return analysis
+    placed = _with_place(analysis)
     if state.status is not Status.SINGULAR:
-        return _facts(state)
-    return _facts(state) | {"mobility": state.mobility} | _singular_matrices(state, turn)
+        return placed
+    return _with_singular_matrices(replace(placed, mobility=state.mobility), turn)
 
 
-def _singular_matrices(state: MachineState, turn: Rotation) -> dict[str, Any]:
-    """Return K and C of a singular pose, with NaN for entries of C that are not finite; nothing if K is not finite."""
-    length, kept = float(state.free.configuration.length), list(state.machine.family.components)
+def _with_singular_matrices(analysis: Analysis, turn: Rotation) -> Analysis:
+    """Return an analysis with K and C of a singular pose, NaN for entries of C that are not finite.
+
+    Where K is not finite either, the analysis stays as it is.
+    """
+    state = analysis.state
+    length, components = float(state.free.configuration.length), list(state.machine.family.components)
     whole = _stiffness_by_legs(state.free, turn, length)
     if whole is None:
-        return {}
-    units = np.repeat([1.0 / length, 1.0], 3)[kept]
-    scaled = units[:, None] * whole[np.ix_(kept, kept)] * units
+        return analysis
+    units = np.repeat([1.0 / length, 1.0], 3)[components]
+    scaled = units[:, None] * whole[np.ix_(components, components)] * units
     scaled[np.abs(scaled) < ROUND_OFF_OF_ENTRY * np.abs(scaled).max()] = 0.0
     values, vectors = np.linalg.eigh(scaled)
+    # Eigenvalues of K grow with the square of the singular values of the wrenches, to which SINGULAR refers.
     resisted = values > SINGULAR**2 * values[-1]
     free = np.abs(vectors[:, ~resisted]).max(axis=1, initial=0.0) > FREE_COMPONENT
     compliance = units[:, None] * ((vectors[:, resisted] / values[resisted]) @ vectors[:, resisted].T) * units
     compliance[free, :] = compliance[:, free] = math.nan
     stiffness = scaled / units[:, None] / units
-    return {
-        "stiffness": stiffness,
-        "stiffness_diagonal": np.diag(stiffness),
-        "finite_compliance": np.array(clean_matrix(compliance.tolist())),
-        "compliance_diagonal": np.where(free, math.inf, np.diag(compliance)),
-        "rank": int(resisted.sum()),
-    }
+    return replace(
+        analysis,
+        stiffness=stiffness,
+        stiffness_diagonal=np.diag(stiffness),
+        finite_compliance=np.array(clean_matrix(compliance.tolist())),
+        compliance_diagonal=np.where(free, math.inf, np.diag(compliance)),
+        rank=int(resisted.sum()),
+    )
 
 
 def _stiffness_by_legs(response: Response, turn: Rotation, length: float) -> Array | None:
-    """K [6 x 6] as the sum over legs of W G^-1 W^T (theory (3)); None where a leg is rigid, free or locked."""
+    """Add up K [6 x 6] over the legs as W G^-1 W^T, theory (3); None where a leg is rigid, free or locked."""
     whole = np.zeros((6, 6))
     for leg in response.legs:
         compliance = np.array(leg.compliance, dtype=float)
@@ -355,7 +365,7 @@ def _stiffness_by_legs(response: Response, turn: Rotation, length: float) -> Arr
 
 
 def _jacobian_condition(response: Response, length: float) -> float | None:
-    """Condition number of the actuators' Jacobian in the components that the actuators move, or None.
+    """Return the condition number of the actuators' Jacobian in the components that the actuators move, or None.
 
     Rows of rotary actuators are in rad and those of linear ones in m. Their ratio means nothing, so that machines with
     both kinds have no such number.
@@ -368,9 +378,9 @@ def _jacobian_condition(response: Response, length: float) -> float | None:
     return twist_condition(actuator_jacobian(response.legs, groups, length, response.guide), length)
 
 
-def _rows(matrix: Symmetric6, kept: tuple[int, ...]) -> Array | None:
+def _rows(matrix: Symmetric6, components: tuple[int, ...]) -> Array | None:
     """Return the rows and columns of the machine's components, without round-off, or None if an entry is not finite."""
-    rows = [[float(matrix.entry(i, j)) for j in kept] for i in kept]
+    rows = [[float(matrix.entry(i, j)) for j in components] for i in components]
     return np.array(clean_matrix(rows)) if np.isfinite(rows).all() else None
 
 
@@ -386,7 +396,7 @@ def _turned_statics(statics: Statics, turn: Rotation) -> Statics:
 
 
 def _rank(response: Response, statics: Statics, compliance_infinite: bool) -> int:
-    """Rank of C, or of K where C is not finite.
+    """Return the rank of C, or of K where C is not finite.
 
     The rank of a sum over springs is the number of their independent screws. They are counted at the size that they may
     have, so that a spring that is much softer than another cannot hide it, and round-off does not count.
@@ -395,48 +405,37 @@ def _rank(response: Response, statics: Statics, compliance_infinite: bool) -> in
     if compliance_infinite:
         wrenches: list[Screw] = [wrench for wrench, k in statics.actions if k > 0.0]
         return count_independent(wrenches, length, CLOSING_ROUND_OFF)
-    sizes = [math.sqrt(size) for leg in response.legs for size in leg.load_squares]
-    greatest = np.linalg.norm(columns([twist for leg in statics.sharing for twist in leg], 1.0, 1.0 / length))
-    flexible = zip(statics.flexibility, statics.compliance, sizes, strict=True)
-    twists = [twist * (1.0 / (size * greatest)) for twist, s, size in flexible if s > 0.0]
+    # A twist of `flexibility` is at most the load that a unit wrench can exert on the spring (theory (7)), times the
+    # share of it that the leg carries, which the norm of all shares bounds: one that is small beside that is round-off.
+    greatest_loads = [math.sqrt(square) for leg in response.legs for square in leg.load_squares]
+    bound_of_shares = np.linalg.norm(columns([twist for leg in statics.sharing for twist in leg], 1.0, 1.0 / length))
+    flexible = zip(statics.flexibility, statics.compliance, greatest_loads, strict=True)
+    twists = [twist * (1.0 / (load * bound_of_shares)) for twist, s, load in flexible if s > 0.0]
     if not twists:
         return 0
     return int((np.linalg.svd(columns(twists, 1.0, 1.0 / length), compute_uv=False) > CLOSING_ROUND_OFF).sum())
 
 
-def _message(
-    state: MachineState,
-    response: Response,
-    rigid: tuple[str, ...],
-    free: tuple[str, ...],
-    finite: bool,
-    load: LoadCase | None,
-) -> str:
-    """Say what is special about a pose that has been analysed.
-
-    Args:
-        state: the state of the machine.
-        response: its response, with statics without round-off.
-        rigid, free: names of the rigid and of the free springs.
-        finite: whether K is finite.
-        load: effects of the machine's load.
-    """
-    sentences = []
-    if not finite and not rigid:
+def _message(analysis: Analysis, statics: Statics) -> str:
+    """Say what is special about a pose that has been analysed, of whose statics round-off is cleaned; base axes."""
+    sentences, state = [], analysis.state
+    k_is_finite = analysis.stiffness is not None
+    if not k_is_finite and not analysis.rigid:
         sentences.append("At this pose a leg is rigid against some load: K is infinite against it, and C is exact.")
-    if rigid:
-        k_is_infinite = "K is infinite in the directions that they hold, C is exact"
-        consequence = "other parts deflect in the same directions, so that K is finite" if finite else k_is_infinite
-        sentences.append(f"Rigid: {', '.join(rigid)}; {consequence}.")
-    all_springs = springs(response.configuration)
-    for spring, twist in zip(all_springs, response.statics.flexibility, strict=True):
-        if spring.name in free:
+    if analysis.rigid:
+        if k_is_finite:
+            consequence = "other parts deflect in the same directions, so that K is finite"
+        else:
+            consequence = "K is infinite in the directions that they hold, C is exact"
+        sentences.append(f"Rigid: {', '.join(analysis.rigid)}; {consequence}.")
+    for spring, twist in zip(springs(state.configuration), statics.flexibility, strict=True):
+        if spring.name in analysis.free:
             per = "m" if spring.joint.point is None else "rad"
             motion = describe([float(c) for c in twist.components()], (f"rad/{per}", f"m/{per}"))
             moves = f"so that the platform moves freely by {motion}" if motion else "and carries nothing"
             sentences.append(f"Free: {spring.name} has no stiffness, {moves}.")
-    if load and load.unheld:
-        sentences.append(load.unheld)
+    if analysis.load and analysis.load.unheld:
+        sentences.append(analysis.load.unheld)
     sentences = sentences or [Status.OK.sentence]
     more = (state.left_out, no_limits_sentence(state.machine.tables["limits"]))
     return " ".join([*sentences, *(sentence for sentence in more if sentence)])

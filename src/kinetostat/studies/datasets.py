@@ -1,7 +1,7 @@
-"""Labelled datasets of quantities: at poses of a list, over a grid of any parameters; and the labels of all datasets.
+"""Labelled datasets of quantities, at poses of a list and over grids of any parameters; and the usual ranges of grids.
 
-Labels are attributes as the CF conventions have them: units, long names, and the meanings of flags. For maps for which
-no ranges are given, those of the pose are found: as far as the machine can follow.
+Labels are attributes as the CF conventions have them: units, long names, and the meanings of flags. Where nobody gives
+the ranges of a map, `usual_ranges` takes coordinates of the pose, as far about it as the machine follows.
 """
 
 import math
@@ -26,7 +26,7 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.limits import limits_set
 from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine, frame_of, pose_of
-from kinetostat.machine.parameters import Parameter, dimension, parameters, values
+from kinetostat.machine.parameters import POSE, Parameter, dimension, parameters, values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.fields import Range, parse_range
@@ -39,6 +39,8 @@ from kinetostat.units import KINDS
 # to the import of this module: then the first answer takes as long as the others.
 xr.Dataset(coords={"pose": [0]})
 
+IN_MEMORY = 5_000_000
+"""Points of a grid that is answered in memory: a dozen quantities of them fit in half a gigabyte."""
 POSES_KEPT = 10_000
 """Most poses of which the labels of an answer are kept; the labels of more take little of their time."""
 LOADS_LEFT_OUT = "loads_left_out"
@@ -48,10 +50,25 @@ ABOUT_STATUS = {
     "flag_meanings": " ".join(status.word for status in Status),
 }
 """Attributes of the variable of statuses."""
-
-
 ABOUT_POSES = {"units": "", "kind": "", "log": 0, "field": "pose.number of the pose"}
-"""Attributes of the coordinate that numbers the poses of a list."""
+"""Attributes of the coordinate that numbers the poses of a list. It has no field; axes of figures are labelled by what
+follows "pose." in "field"."""
+
+MOST_RANGES_OF_MAPS = 2
+"""Greatest number of ranges of the maps of a report: a map has two axes."""
+PROBE_STEPS = 48
+"""Number of poses to each side that are tried along a coordinate: its range is then known to two percent."""
+LARGEST_REACH = {"length": 0.3, "angle": math.radians(15.0)}
+"""Greatest distance of an end of a range from the pose, by kind of coordinate: a share of the characteristic length, or
+rad. Machines commonly work within about as much."""
+LARGEST_REACH_IN_LIMITS = {"length": 1.0, "angle": math.radians(90.0)}
+"""The same for a machine whose file has limits, which then end its ranges."""
+LEAST_MARGIN_SHARE = 0.1
+"""Least singularity margin in a range, as a share of that of the pose: near a singularity a map shows nothing else."""
+ROUND_UNIT = {"length": 1.0, "angle": math.radians(1.0)}
+"""Unit in which ends of ranges are round numbers, by kind of coordinate: m, or a degree."""
+ROUND_SLACK = 1e-6
+"""Share of the step of round numbers within which an end counts as round already: far above round-off."""
 
 
 def about_quantity(name: str) -> dict[str, str]:
@@ -137,7 +154,7 @@ def as_dataset(answers: PoseAnswers) -> xr.Dataset:
     fields = {field.dimension: column for field, column in zip(poses.fields, poses.values, strict=True)}
     arrays = {"status": answers.status, **{name: answers.values[name] for name in answers.names}, **fields}
     arrays |= {matrix: answers.matrix(matrix) for matrix in answers.matrices}
-    layout = _layout if poses.count <= POSES_KEPT else _layout.__wrapped__
+    layout = _layout if poses.count <= POSES_KEPT else _layout.__wrapped__  # the function without its cache
     empty = layout(
         Identical(answers.machine),
         tuple(Identical(field) for field in poses.fields),
@@ -164,28 +181,24 @@ def _layout(
 
     Fields are variables in it, because copies take the values of variables alone.
     """
-    nothing, parts = np.broadcast_to(0.0, count), machine.value.family.component_names
+    zeros, components = np.broadcast_to(0.0, count), machine.value.family.component_names
     coordinates: dict[str, Any] = {"pose": ("pose", np.arange(count), ABOUT_POSES)}
     for field in (each.value for each in fields):
-        coordinates[field.dimension] = ("pose", nothing, {**about_field(field), "path": field.path})
-    variables: dict[str, Any] = {name: ("pose", nothing, about_quantity(name)) for name in names}
+        coordinates[field.dimension] = ("pose", zeros, {**about_field(field), "path": field.path})
+    variables: dict[str, Any] = {name: ("pose", zeros, about_quantity(name)) for name in names}
     if matrices:
-        coordinates |= {"row": list(parts), "column": list(parts)}
+        coordinates |= {"row": list(components), "column": list(components)}
     for matrix in matrices:
         units = "SI: N·m/rad, N/rad, N/m" if matrix == "K" else "SI: rad/(N·m), rad/N, m/N"
-        described = {"long_name": f"{MATRICES[matrix]} matrix", "units": units}
-        entries = np.broadcast_to(0.0, (count, len(parts), len(parts)))
-        variables[matrix] = (("pose", "row", "column"), entries, described)
+        about = {"long_name": f"{MATRICES[matrix]} matrix", "units": units}
+        entries = np.broadcast_to(0.0, (count, len(components), len(components)))
+        variables[matrix] = (("pose", "row", "column"), entries, about)
     leaves = [leaf for field in fields for leaf in field.value.leaves]
     return xr.Dataset(
-        {"status": ("pose", nothing, ABOUT_STATUS), **variables},
+        {"status": ("pose", zeros, ABOUT_STATUS), **variables},
         coordinates,
         origin_of(machine.value, leaves, uncounted),
     ).reset_coords([field.value.dimension for field in fields])
-
-
-IN_MEMORY = 5_000_000
-"""Points of a grid that is answered in memory: a dozen quantities of them fit in half a gigabyte."""
 
 
 @dataclass(frozen=True)
@@ -304,14 +317,14 @@ def _evaluate_all(question: GridQuestion, progress: Progress, compute: Compute) 
     if compute is in_this_process:
         return batch.evaluate(question.machine, question.grid, question.names, progress)
     work = in_chunks(question.machine, question.grid, question.names)
-    parts, done = {}, 0
-    for number, part in compute(work, range(work.count)):
-        parts[number] = part
-        done += len(part.status)
-        progress(done, question.grid.size)
-    ordered = [parts[number] for number in range(work.count)]
-    columns = {name: np.concatenate([part.values[name] for part in ordered]) for name in question.names}
-    return Evaluation(columns, np.concatenate([part.status for part in ordered]))
+    chunks, points_done = {}, 0
+    for number, chunk in compute(work, range(work.count)):
+        chunks[number] = chunk
+        points_done += len(chunk.status)
+        progress(points_done, question.grid.size)
+    in_order = [chunks[number] for number in range(work.count)]
+    columns = {name: np.concatenate([chunk.values[name] for chunk in in_order]) for name in question.names}
+    return Evaluation(columns, np.concatenate([chunk.status for chunk in in_order]))
 
 
 def field_of(coordinate: xr.DataArray) -> str:
@@ -325,23 +338,6 @@ def failures(dataset: xr.Dataset) -> dict[Status, int]:
     return {Status(int(code)): int(n) for code, n in zip(codes, counts, strict=True) if code != Status.OK}
 
 
-MOST_RANGES_OF_MAPS = 2
-"""Greatest number of ranges of the maps of a report: a map has two axes."""
-PROBE_STEPS = 48
-"""Number of poses to each side that are tried along a coordinate: its range is then known to two percent."""
-LARGEST_REACH = {"length": 0.3, "angle": math.radians(15.0)}
-"""Largest distance from the pose, by kind of coordinate: in units of the characteristic length, and in rad: over as
-much, machines of this size commonly work."""
-LARGEST_REACH_IN_LIMITS = {"length": 1.0, "angle": math.radians(90.0)}
-"""The same for a machine whose file has limits, which then end its ranges."""
-LEAST_MARGIN_SHARE = 0.1
-"""Least singularity margin in a range, as a share of that of the pose: near a singularity a map shows nothing else."""
-ROUND_SLACK = 1e-6
-"""Share of a step within which an end counts as round already."""
-ROUND_UNIT = {"length": 1.0, "angle": math.radians(1.0)}
-"""Unit in which coordinates of a kind are round numbers."""
-
-
 def usual_ranges(machine: Machine, count: int) -> list[str]:
     """Two ranges "pose.x=from:to:count" about the pose, translations first; fewer where fewer coordinates can change.
 
@@ -353,10 +349,10 @@ def usual_ranges(machine: Machine, count: int) -> list[str]:
         count: number of points of each range.
     """
     reaches = LARGEST_REACH_IN_LIMITS if limits_set(machine.tables["limits"]) else LARGEST_REACH
-    coordinates = [p for p in parameters(machine.family) if p.path.startswith("pose.") and len(p.leaves) == 1]
-    ordered = sorted(coordinates, key=lambda p: p.quantity.kind != "length")
+    coordinates = [p for p in parameters(machine.family) if p.path.startswith(POSE) and len(p.leaves) == 1]
+    translations_first = sorted(coordinates, key=lambda p: p.quantity.kind != "length")
     length, ranges = float(state_of(machine).configuration.length), []
-    for parameter in ordered:
+    for parameter in translations_first:
         reach = reaches[parameter.quantity.kind] * (length if parameter.quantity.kind == "length" else 1.0)
         low, high = _extent(machine, parameter, reach)
         if high > low:
@@ -380,7 +376,10 @@ def coarser_ranges(ranges: Sequence[str], most: int) -> list[str]:
 
 
 def _extent(machine: Machine, parameter: Parameter, reach: float) -> tuple[float, float]:
-    """Both ends of the range of a coordinate, SI: the farthest poses without a bad one before them."""
+    """Both ends of the range of a coordinate, SI: the farthest poses between which and the pose all others are good.
+
+    A pose is good if it has an answer and its singularity margin is not far below that of the pose.
+    """
     (path,), value = parameter.leaves, float(values(machine)[parameter.path])
     steps = np.linspace(-reach, reach, 2 * PROBE_STEPS + 1)
     probe = batch.evaluate(machine, PointTable({path: value + steps}), ["singularity_margin"])
@@ -393,7 +392,7 @@ def _extent(machine: Machine, parameter: Parameter, reach: float) -> tuple[float
 
 
 def _rounded_inwards(ends: Array, unit: float) -> tuple[float, float]:
-    """Move both ends inwards to round numbers, by a tenth of the range at most."""
+    """Move both ends inwards to multiples of a power of ten of the unit, by a tenth of the range at most."""
     low, high = (float(end) for end in ends)
     if high == low:
         return low, high
