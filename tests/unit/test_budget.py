@@ -16,7 +16,7 @@ from kinetostat.exchange.leg_by_leg import legs_of
 from kinetostat.machine.loading import build
 from kinetostat.machine.parameters import values
 from kinetostat.spec.tolerance_table import read_tolerances
-from kinetostat.studies.allocation import allocation_for, reach_of
+from kinetostat.studies.allocation import allocation_for, effects_of_limits
 from kinetostat.views.budget_forms import contributions_csv
 
 LINES = {
@@ -184,13 +184,29 @@ def test_a_joint_is_free_at_poses_where_the_load_does_not_reach_it():
         alone = inputs(parts, rates[pose], load)
         for many, single in zip(together, first_order(alone, measures()), strict=True):
             assert many[pose] == pytest.approx(single[0], rel=1e-2, abs=1e-12)
-        for by, table in reach_of(whole, measures(), "position").items():
-            assert table[pose] == pytest.approx(reach_of(alone, measures(), "position")[by][0])
+        for by, table in effects_of_limits(whole, measures(), "position").items():
+            assert table[pose] == pytest.approx(effects_of_limits(alone, measures(), "position")[by][0])
     rows = spread_of(whole, measures(), whole.machines(FEW, 0))[0].rms
     drawn = np.concatenate(list(whole.machines(FEW, 0)))
     for pose in range(3):
         moved = whole.shift[pose] + drawn @ whole.columns[pose].T
         assert np.sqrt((moved**2).mean(axis=0)) == pytest.approx(rows[pose, :6], rel=0.02)
+
+
+def test_a_component_is_parasitic_if_no_actuator_moves_it_at_any_pose(monkeypatch):
+    """At x = 0 no actuator turns this platform about z, elsewhere they do: the order of the poses decides nothing."""
+    machine = load("passive-leg-4dof-driven")
+    beside, middle = machine.with_values({"x": 0.02}), machine.with_values({"x": 0.0})
+    lines = {"zeros": ["0.02 mm", "0.02 deg"]}
+    assert budget(middle, tolerances=lines, samples=8).parasitic == ("rz", "y")
+    assert budget(beside, tolerances=lines, samples=8).parasitic == ("y",)
+    for poses in ([0.02, 0.0], [0.0, 0.02]):
+        together = budget(machine, {"x": poses}, tolerances=lines, samples=8)
+        with monkeypatch.context() as patch:
+            patch.setattr("kinetostat.studies.budget.DRAWN_POSES_AT_ONCE", 1)
+            one_by_one = budget(machine, {"x": poses}, tolerances=lines, samples=8)
+        assert one_by_one.parasitic == together.parasitic == ("y",)
+        assert one_by_one.freedoms == together.freedoms == 4
 
 
 def test_loads_at_named_points_press_joints_together():

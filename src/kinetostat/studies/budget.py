@@ -38,8 +38,9 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.spec.fields import positive_number
 from kinetostat.spec.immutable import ImmutableAnswer
+from kinetostat.spec.renamed import former_names
 from kinetostat.spec.tolerance_table import Tolerance, joined_tolerances, read_tolerances
-from kinetostat.studies.allocation import Allocation, allocation_for, reach_of
+from kinetostat.studies.allocation import ALLOCATION_RULES, Allocation, allocation_for, effects_of_limits
 from kinetostat.studies.attribution import ranking_of
 from kinetostat.studies.datasets import GridQuestion, grid_question
 from kinetostat.studies.directions import unit_direction
@@ -60,8 +61,6 @@ DRAWN_POSES_AT_ONCE = 128
 """Poses whose machines are drawn together: enough that the time of a call does not count."""
 MOST_AT_ONCE = 1 << 20
 """Products of poses and machines that are kept at once: each has a dozen numbers, a hundred megabytes together."""
-ALLOCATION_RULES = ("rss", "worst")
-"""Rules by which errors add up where tolerances are allocated."""
 STATISTICS = {
     "mean": "of the average machine",
     "rms": "root mean square",
@@ -70,8 +69,8 @@ STATISTICS = {
     "worst": "worst case",
 }
 """The statistics of a measure, and what people call them."""
-SHARE_KEYS = ("line", "leg", "group", "path")
-"""Attributes of a part by which shares in a variance are added up."""
+MOST_NAMED_LINES = 4
+"""Lines of [tolerances] that a sentence names: with more it is no longer read, and the table has all."""
 LEAST_NAMED_SHARE = 0.005
 """Share of the variance below which a line of [tolerances] is not named: it would be written as 0 %."""
 ROUND_OFF_SHARE = 1e-9
@@ -80,6 +79,7 @@ DRAWN_DIGITS = 3
 """Digits of errors of the tool: percentiles of drawn machines have no more."""
 
 
+@former_names(sometimes="sometimes_pressed")
 @dataclass(frozen=True, eq=False)
 class Budget(ImmutableAnswer):
     """The error of the tool at n poses, and what it is made of.
@@ -89,7 +89,7 @@ class Budget(ImmutableAnswer):
         tolerances: lines that hold, in order.
         parts: parts that have a tolerance.
         pressed: paths of joints that the load presses to one end of their clearance, at any pose.
-        sometimes: those of them that it presses at some poses only; elsewhere they are free.
+        sometimes_pressed: those of them that it presses at some poses only; elsewhere they are free.
         poses: poses of the list; None for another source of poses.
         question: question about the grid; None if the poses are not those of a grid.
         status: `Status` codes [n].
@@ -98,8 +98,8 @@ class Budget(ImmutableAnswer):
         units: unit of each measure, "rad" or "m".
         spread: statistics of each measure [n x measures]; NaN where the status is not OK.
         shares: share of each part in the variance of each measure, all poses together [measures x parts].
-        freedoms: number of independent motions that the actuators give the platform.
-        parasitic: components of the twist that no actuator moves.
+        freedoms: least number of independent motions that the actuators give the platform, over all poses.
+        parasitic: components of the twist that no actuator moves at any pose.
         samples: number of machines that were drawn.
         exact: machines solved exactly, if they were asked for.
         allocation: tolerances of least cost, if they were asked for.
@@ -111,7 +111,7 @@ class Budget(ImmutableAnswer):
     tolerances: tuple[Tolerance, ...]
     parts: tuple[TolerancedPart, ...]
     pressed: tuple[str, ...]
-    sometimes: tuple[str, ...]
+    sometimes_pressed: tuple[str, ...]
     poses: PoseColumns | None
     question: GridQuestion | None
     status: Integers
@@ -171,7 +171,7 @@ class Budget(ImmutableAnswer):
         Raises:
             InputError: there is no such key or measure.
         """
-        choice(key, SHARE_KEYS, "key")
+        choice(key, ("line", "leg", "group", "path"), "key")
         row = self.shares[self.measures.index(choice(measure or self.leading, self.measures, "measure"))]
         sums: dict[str, float] = {}
         for part, share in zip(self.parts, row.tolist(), strict=True):
@@ -227,22 +227,21 @@ def budget(
     """
     _check(poses, ranges, samples, exact, by, seed)
     state = state_of(machine)
-    machine = state.machine
-    lines = joined_tolerances(machine.tolerances, read_tolerances({} if tolerances is None else tolerances))
+    lines = joined_tolerances(state.machine.tolerances, read_tolerances({} if tolerances is None else tolerances))
     question = grid_question(state, ranges, ["singularity_margin"]) if ranges else None
-    columns = None if poses is None else given_poses(machine, poses)
-    leaves, count = _points(question, columns)
+    columns = None if poses is None else given_poses(state.machine, poses)
+    leaves, count = _leaves_and_count(question, columns)
     if count > MOST_BUDGET_POSES:
         raise InputError(f"there are {count:,} poses; at most {MOST_BUDGET_POSES:,} are computed: lower their number.")
     direction = np.array(unit_direction(along, "along")) if len(along) else None
-    drawn = _power_of_2(samples or (SAMPLES if count == 1 else FEW_SAMPLES))
-    sums = _Sums(state, lines, direction, drawn, seed, many=count > 1)
-    status = np.full(count, int(Status.OUT_OF_REACH), dtype=np.int64)
-    step = max(1, min(DRAWN_POSES_AT_ONCE, MOST_AT_ONCE // sums.samples))
+    machines = _power_of_2(samples or (SAMPLES if count == 1 else FEW_SAMPLES))
+    sums = _Sums(state, lines, direction, machines, seed, others=count > 1 and platform_is_loaded(state.machine))
+    status = np.empty(count, dtype=np.int64)
+    step = max(1, min(DRAWN_POSES_AT_ONCE, MOST_AT_ONCE // machines))
     for start in range(0, count, step):
-        rows = slice(start, min(start + step, count))
-        status[rows] = sums.add({path: column[rows] for path, column in leaves.items()}, rows.stop - start)
-        progress(rows.stop, count)
+        slab = slice(start, min(start + step, count))
+        status[slab] = sums.add({path: column[slab] for path, column in leaves.items()}, slab.stop - start)
+        progress(slab.stop, count)
     return _answer(sums, status, question, columns, exact, allocate, by)
 
 
@@ -264,21 +263,30 @@ def _power_of_2(count: int) -> int:
     return 1 << max(0, count - 1).bit_length()
 
 
-def _points(question: GridQuestion | None, columns: PoseColumns | None) -> tuple[Mapping[str, Array], int]:
+def _leaves_and_count(question: GridQuestion | None, columns: PoseColumns | None) -> tuple[Mapping[str, Array], int]:
+    """The parameters that vary, by leaf path, and the number of poses: those of a grid, of a list, or the machine's."""
     if question is not None:
         return question.grid.columns(0, question.grid.size), question.grid.size
     return ({}, 1) if columns is None else (columns.leaves, columns.count)
 
 
 class _Sums:
-    """Adds up the answer, some poses at a time; every pose has the same machines.
+    """Adds up the answer, a slab of poses at a time; at every pose the same machines are drawn.
 
     Attributes:
-        pressed: whether the load presses each part at each pose, a table for each addition [poses x parts].
-        spreads: for each addition, at which of its poses there are results [poses], and these.
-        reach: for each addition, how far each part moves the leading measure, m or m², see `allocation.reach_of`.
+        state, lines, along, samples, seed: as for `budget`.
+        others: as for `random_inputs`: whether joints that are free at one pose may be pressed at another.
+        leading: the measure for which tolerances are allocated, as `Budget.leading`.
+        components: names of the components of twists that the machine has.
+        parts: parts with a tolerance; none before the first slab.
+        first: the variables and the measures at the first slab with a result; None before it.
+        freedoms: least number of motions that the actuators give the platform at any pose.
+        parasitic: components of the twist that no actuator moves at any pose.
+        pressed: whether the load presses each part, for each slab with a result [poses with a result x parts].
+        spreads: for each slab, at which of its poses there are results [poses], and these; None without any.
+        effects: for each slab with a result, what limits do to the leading measure, as `effects_of_limits` returns it.
         largest: the largest error of each drawn machine over all poses [machines x measures].
-        squares: variances of the measures by part, all poses together [measures x parts].
+        variances: variances of the measures by part, all poses together [measures x parts].
     """
 
     def __init__(
@@ -288,30 +296,26 @@ class _Sums:
         along: Array | None,
         samples: int,
         seed: int,
-        many: bool,
+        others: bool,
     ) -> None:
-        """Begin; arguments are those of `budget`, and `many` says whether there are several poses."""
-        self.state, self.lines, self.along, self.samples, self.seed = state, lines, along, samples, seed
+        """Begin without any pose."""
+        self.state, self.lines, self.along = state, lines, along
+        self.samples, self.seed, self.others = samples, seed, others
+        self.leading = "position" if along is None else "along"
         self.parts: tuple[TolerancedPart, ...] = ()
-        self.many, self.pressed = many, list[Mask]()
-        self.measures: Measures | None = None
-        self.inputs: RandomInputs | None = None
-        self.freedoms, self.parasitic = 0, tuple[str, ...]()
+        self.first: tuple[RandomInputs, Measures] | None = None
+        self.components = state.machine.family.component_names
+        self.freedoms, self.parasitic = len(self.components), self.components
+        self.pressed: list[Mask] = []
         self.spreads: list[tuple[Mask, Spread | None]] = []
-        self.reach: list[dict[str, Array]] = []
+        self.effects: list[dict[str, Array]] = []
         self.largest: Array | float = -np.inf
-        self.squares: Array | float = 0.0
-
-    @property
-    def machine(self) -> Machine:
-        """The machine as drawn."""
-        return self.state.machine
+        self.variances: Array | float = 0.0
 
     def add(self, columns: Mapping[str, Array], count: int) -> Codes:
-        """Add some poses, by the values of the parameters that vary; return their `Status` codes."""
+        """Add a slab of poses, by the values of the parameters that vary; return their `Status` codes."""
         model = error_model(self.state, columns, count)
-        if not self.parts:
-            self.parts = toleranced_parts(self.machine, model.errors, self.lines)
+        self.parts = self.parts or toleranced_parts(self.state.machine, model.errors, self.lines)
         settled = np.asarray(model.drawn.status == Status.OK)
         spread = self._add_spread(model.at_poses(np.flatnonzero(settled))) if settled.any() else None
         self.spreads.append((settled, spread))
@@ -321,19 +325,17 @@ class _Sums:
         """Add the poses of a model, all of which have a result, and return the statistics at them."""
         length = float(self.state.configuration.length)
         rates = _without_round_off(model.rates(), length)
-        inputs = random_inputs(
-            self.parts, rates, model.drawn.load, length, others=self.many and platform_is_loaded(self.machine)
-        )
+        inputs = random_inputs(self.parts, rates, model.drawn.load, length, others=self.others)
         zeros = [place for place, error in enumerate(model.errors) if error.group == "zeros"]
-        names = self.machine.family.component_names
-        measures, self.freedoms, self.parasitic = measures_of(rates[:, :, zeros], names, self.along, length)
+        measures, freedoms, parasitic = measures_of(rates[:, :, zeros], self.components, self.along, length)
+        self.freedoms = min(self.freedoms, freedoms)
+        self.parasitic = tuple(name for name in self.parasitic if name in parasitic)
         self.pressed.append(inputs.pressed)
-        if self.inputs is None:
-            self.inputs, self.measures = inputs, measures
+        self.first = self.first or (inputs, measures)
         spread, largest = spread_of(inputs, measures, inputs.machines(self.samples, self.seed))
         self.largest = np.maximum(self.largest, largest)
-        self.squares = self.squares + variance_by_part(inputs, measures)
-        self.reach.append(reach_of(inputs, measures, "position" if self.along is None else "along"))
+        self.variances = self.variances + variance_by_part(inputs, measures)
+        self.effects.append(effects_of_limits(inputs, measures, self.leading))
         return spread
 
 
@@ -352,91 +354,94 @@ def _answer(
     allocate: float | str | None,
     by: str,
 ) -> Budget:
-    inputs, measures = sums.inputs, sums.measures
-    if inputs is None or measures is None:
+    """The answer by the sums over all poses, whose `Status` codes are given; other arguments as for `budget`."""
+    machine = sums.state.machine
+    if sums.first is None:
         reason = Status(int(status[0]))
         where = "the pose" if len(status) == 1 else "all poses"
         raise InputError(
-            f"{sums.machine.name} has no result at {where} ({reason.phrase}): {reason.sentence} "
+            f"{machine.name} has no result at {where} ({reason.phrase}): {reason.sentence} "
             f"{columns.unit_doubt if columns else ''}".rstrip()
         )
+    inputs, measures = sums.first
+    allocation = None
+    if allocate is not None:
+        wanted = positive_number(allocate, "length", "allocate, the wanted error,")
+        allocation = allocation_for(sums.parts, sums.effects, wanted, by, sums.leading)
     pressed = np.concatenate(sums.pressed)
-    at_any = [part.path for place, part in enumerate(sums.parts) if pressed[:, place].any()]
-    at_all = [part.path for place, part in enumerate(sums.parts) if pressed[:, place].all()]
+    at_any_pose = [part.path for part, is_pressed in zip(sums.parts, pressed.any(axis=0), strict=True) if is_pressed]
+    at_all_poses = [part.path for part, is_pressed in zip(sums.parts, pressed.all(axis=0), strict=True) if is_pressed]
     answer = Budget(
-        machine=sums.machine,
+        machine=machine,
         tolerances=tuple(sums.lines.values()),
         parts=sums.parts,
-        pressed=tuple(at_any),
-        sometimes=tuple(path for path in at_any if path not in at_all),
+        pressed=tuple(at_any_pose),
+        sometimes_pressed=tuple(path for path in at_any_pose if path not in at_all_poses),
         poses=columns,
         question=question,
         status=status,
         measures=measures.names,
         units=tuple(measures.units[name] for name in measures.names),
         spread=_joined_spread(sums, len(measures.names)),
-        shares=shares(np.asarray(sums.squares)),
+        shares=shares(np.asarray(sums.variances)),
         freedoms=sums.freedoms,
         parasitic=sums.parasitic,
         samples=sums.samples,
-        exact=exact_sample(sums.machine, inputs, measures, _power_of_2(exact), sums.seed) if exact else None,
-        allocation=None,
+        exact=exact_sample(machine, inputs, measures, _power_of_2(exact), sums.seed) if exact else None,
+        allocation=allocation,
         message="",
         loads_left_out=sums.state.left_out,
     )
-    if allocate is not None:
-        wanted = positive_number(allocate, "length", "allocate, the wanted error,")
-        allocation = allocation_for(sums.parts, sums.reach, wanted, by, answer.leading)
-        answer = replace(answer, allocation=allocation)
     return replace(answer, message=_message(answer))
 
 
 def _joined_spread(sums: _Sums, size: int) -> Spread:
-    """The spreads of all slabs of poses as one, NaN where there is no result."""
-    parts: dict[str, list[Array]] = {name: [] for name in ("mean", "rms", "rss", "worst", "usual")}
+    """The spreads of all slabs as one, NaN where there is no result; `size` is the number of measures."""
+    tables_by_statistic: dict[str, list[Array]] = {name: [] for name in STATISTICS}
     for settled, spread in sums.spreads:
-        for name, tables in parts.items():
+        for name, tables in tables_by_statistic.items():
             table = np.full((len(settled), size), np.nan)
             if spread is not None:
                 table[settled] = getattr(spread, name)
             tables.append(table)
-    everywhere = np.percentile(np.asarray(sums.largest), USUAL_PERCENT, axis=0)
-    return Spread(**{name: np.concatenate(tables) for name, tables in parts.items()}, everywhere=everywhere)
+    at_poses = {name: np.concatenate(tables) for name, tables in tables_by_statistic.items()}
+    return Spread(**at_poses, everywhere=np.percentile(np.asarray(sums.largest), USUAL_PERCENT, axis=0))
 
 
 def _message(answer: Budget) -> str:
-    leading = answer.leading
-    pose = answer.worst_pose
+    leading, pose = answer.leading, answer.worst_pose
     usual, worst = (float(answer.size(name, leading)[pose]) for name in ("usual", "worst"))
     where = "along the direction" if leading == "along" else "at the tool point"
-    at_worst_pose = "" if len(answer.status) == 1 else f" at the worst of {int(answer.settled.sum())} poses"
-    size, most = (_small_motion(answer, value, "m") for value in (usual, worst))
-    first_sentence = f"95 % of all machines are off by at most {size} {where}{at_worst_pose} (worst case {most})."
     if not worst:
         return f"The tolerances do not move the tool {where}. {answer.loads_left_out}".strip()
+    at_worst_pose = "" if len(answer.status) == 1 else f" at the worst of {int(answer.settled.sum())} poses"
+    size, most = (_small_motion(answer, value, "m") for value in (usual, worst))
+    sentences = [f"95 % of all machines are off by at most {size} {where}{at_worst_pose} (worst case {most})."]
     shares_of_lines = answer.shares_by("line").items()
     ranked = [f"{name} ({100.0 * share:.0f} %)" for name, share in shares_of_lines if share > LEAST_NAMED_SHARE]
-    sentences = [first_sentence, f"The variance comes from {', '.join(ranked[:4])}."]
+    sentences.append(f"The variance comes from {', '.join(ranked[:MOST_NAMED_LINES])}.")
     if answer.freedoms < len(answer.machine.family.components):
         sentences.append(_parasitic_sentence(answer, pose))
     if answer.pressed:
-        some = f" ({len(answer.sometimes)} of them at some poses only)" if answer.sometimes else ""
+        some = f" ({len(answer.sometimes_pressed)} of them at some poses only)" if answer.sometimes_pressed else ""
         sentences.append(f"The load presses {len(answer.pressed)} joints to one end of their clearance{some}.")
     return " ".join([*sentences, answer.loads_left_out]).strip()
 
 
 def _parasitic_sentence(answer: Budget, pose: int) -> str:
     """Say which part of the error no correction of the actuators takes away."""
-    parts = []
-    for measure, words in (("rotation", "turns by up to"), ("rz", "turns by up to"), ("position", "moves by up to")):
+    # A planar machine has the component rz in the place of a rotation.
+    rotation = "rotation" if f"{PARASITIC}rotation" in answer.measures else "rz"
+    clauses = []
+    for measure, verb, unit in ((rotation, "turns", "rad"), ("position", "moves", "m")):
         name = f"{PARASITIC}{measure}"
-        if name in answer.measures and not (measure == "rz" and f"{PARASITIC}rotation" in answer.measures):
+        if name in answer.measures:
             size = float(answer.size("usual", name)[pose])
-            if size > ROUND_OFF_SHARE * float(answer.size("usual", name.removeprefix(PARASITIC))[pose]):
-                parts.append(f"{words} {_small_motion(answer, size, answer.units[answer.measures.index(name)])}")
-    what = f"no actuator moves {' '.join(answer.parasitic)}" if answer.parasitic else "no actuator corrects all of it"
-    left = f", and by parasitic motions the platform {' and '.join(parts)} (95 %)" if parts else ""
-    return f"The machine has {answer.freedoms} freedoms: {what}{left}."
+            if size > ROUND_OFF_SHARE * float(answer.size("usual", measure)[pose]):
+                clauses.append(f"{verb} by up to {_small_motion(answer, size, unit)}")
+    lack = f"no actuator moves {' '.join(answer.parasitic)}" if answer.parasitic else "no actuator corrects all of it"
+    remainder = f", and by parasitic motions the platform {' and '.join(clauses)} (95 %)" if clauses else ""
+    return f"The machine has {answer.freedoms} freedoms: {lack}{remainder}."
 
 
 def _small_motion(answer: Budget, value: float, unit: str) -> str:

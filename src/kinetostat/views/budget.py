@@ -15,9 +15,8 @@ from kinetostat.display import Display, number
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.machine import Machine
-from kinetostat.studies.allocation import Allocation
+from kinetostat.studies.allocation import ALLOCATION_RULES, Allocation
 from kinetostat.studies.budget import (
-    ALLOCATION_RULES,
     DRAWN_DIGITS,
     ROUND_OFF_SHARE,
     STATISTICS,
@@ -265,7 +264,7 @@ BUDGET = Description(
         Field("shares_by_line", lambda answer: answer.shares_by("line")),
         Field("shares_by_leg", lambda answer: answer.shares_by("leg")),
         Field("pressed_joints", "pressed"),
-        Field("sometimes_pressed_joints", "sometimes"),
+        Field("sometimes_pressed_joints", "sometimes_pressed"),
         Field("freedoms"),
         Field("parasitic"),
         Field("exact", _exact_of),
@@ -400,7 +399,7 @@ BUDGET_QUESTION = Question(
             "choice",
             "what must keep it: the root of the sum of squares (default), or the worst case",
             default="rss",
-            choices=ALLOCATION_RULES,
+            choices=tuple(ALLOCATION_RULES),
         ),
         Option("seed", "count", "seed of the random machines (default: 0)", metavar="SEED", default=0),
         Option("list_errors", "flag", "only list every number that may be off, with its path", word="--list"),
