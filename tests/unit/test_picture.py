@@ -10,9 +10,9 @@ from PIL import Image
 from kinetostat.algebra.vector import Displacement, Vector, rotation_x
 from kinetostat.machine.loading import load
 from kinetostat.views.picture import machine_picture, picture
-from kinetostat.views.rendering.camera import VIEWPOINTS, Triangles, camera_on, hits_of, normals_at
+from kinetostat.views.rendering.camera import VIEWPOINTS, camera_on
 from kinetostat.views.rendering.light import light_on
-from kinetostat.views.rendering.rasteriser import nearest_triangles
+from kinetostat.views.rendering.visibility import Triangles, hits_of, nearest_triangles, normals_at
 from kinetostat.views.scene import shapes
 from kinetostat.views.scene.machine_scene import scene_of
 from kinetostat.views.scene.mesh import mesh_of

@@ -20,7 +20,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.arguments import as_list, checked
 from kinetostat.spec.errors import InputError, choice, shorten
-from kinetostat.views.rendering.camera import VIEWPOINTS, Camera, Hits, Triangles, camera_on, hits_of
+from kinetostat.views.rendering.camera import VIEWPOINTS, Camera, camera_on
 from kinetostat.views.rendering.light import (
     LARGEST_GROUND_MAP,
     Ground,
@@ -30,6 +30,7 @@ from kinetostat.views.rendering.light import (
     srgb_of,
     veil_over,
 )
+from kinetostat.views.rendering.visibility import Hits, Triangles, hits_of
 from kinetostat.views.scene.machine_scene import scene_of
 from kinetostat.views.scene.solids import LAYERS, LOOKS, Label, Scene, Solid
 

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
@@ -16,13 +16,9 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from kinetostat.arrays import Array, Float32s, Integers, Mask
 from kinetostat.engine.batch import available_cores
 from kinetostat.frozen import dataclass
-from kinetostat.views.rendering.camera import Camera, Triangles, axes_towards
-from kinetostat.views.rendering.rasteriser import nearest_triangles
+from kinetostat.views.rendering.camera import Camera, axes_towards
+from kinetostat.views.rendering.visibility import Triangles, nearest_triangles
 from kinetostat.views.scene.solids import LOOKS, linear
-
-Lamp: TypeAlias = tuple[Float32s, Callable[[Float32s, Float32s], Mask]]
-"""Direction to a distant lamp, and a function that tells whether it reaches points [3 x n], given the pixels by which
-each is looked up beside its place in the map of the lamp [2 x n]."""
 
 SUN = np.array((-0.55, -0.75, 1.5)) / math.sqrt(0.55**2 + 0.75**2 + 1.5**2)
 """Direction to the main light, base axes: over the left shoulder of a viewer in front."""
@@ -68,6 +64,43 @@ HIDDEN_BOUNCE, HIDDEN_ROOM = 0.35, 0.3
 open: light in corners is never all gone."""
 BOX_DIMMING = 0.45
 """Share of the brightness of a mirrored soft box that the roughest surface takes away."""
+NO_LIGHT = 1e-6
+"""Light below which a point faces no part of the sky: far below what a pixel can show."""
+GROUND_RADIUS = 1.7
+"""Radius of the ground that is drawn, in diagonals of the machine."""
+LARGEST_GROUND_MAP = 448
+"""Largest side of the ground's own map of light, points."""
+SUN_SHARE = 0.6
+"""Share of the main light in the light on open ground."""
+FAINTEST_SHADOW = 0.015
+"""Share of missing light below which the ground is simply bright."""
+EDGE_FADE = 0.12
+"""Share of the picture over which the ground fades towards each edge, so that pictures stand on a page unframed."""
+SHADOW_FADE = 1.0 / 3.0
+"""Share of the way from the rim of the ground to its centre on which shadows fade in: they do not end in a line."""
+GRID_FADE_POWER = 1.5
+"""Power of that way by which the ink of the grid grows: lines at the rim are fainter than shadows."""
+GRID_LINE_WIDTH = 1.1
+"""Width of the grid's lines, pixels."""
+MESHES_ACROSS = 8.0
+"""Meshes of the grid across the machine, about: their width is a power of ten, m."""
+LEAST_MESHES = 1e-9
+"""Meshes across a pixel at least: there are none where the ground ends, and lines are drawn by dividing by them."""
+LEAST_MESH_PIXELS = 1.0 / 0.35
+"""Pixels of a mesh below which its lines are fainter, because they crowd towards the horizon."""
+
+
+class Lamp(NamedTuple):
+    """A distant lamp.
+
+    Attributes:
+        direction: unit vector to the lamp, base axes.
+        reaches: tells whether its light reaches points [3 x n], given the pixels by which each is looked up beside its
+            place in the map of the lamp [2 x n].
+    """
+
+    direction: Float32s
+    reaches: Callable[[Float32s, Float32s], Mask]
 
 
 @dataclass(frozen=True)
@@ -98,21 +131,26 @@ def light_on(points: Array, normals: Array, casters: Triangles, detail: int) -> 
     centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low)) or 1.0
     places, facing = (np.ascontiguousarray(array.T, dtype=np.float32) for array in (points, normals))
     map_offsets = LOOKUP_BLUR * (np.random.default_rng(0).random((2, len(points)), dtype=np.float32) - 0.5)
-    parts = [slice(start, start + BLOCK_POINTS) for start in range(0, len(points), BLOCK_POINTS)]
-    sums = []
+    blocks = [slice(start, start + BLOCK_POINTS) for start in range(0, len(points), BLOCK_POINTS)]
     with ThreadPoolExecutor(available_cores()) as threads:
-        for directions, largest in ((_sun_directions(), SUN_SIDE), (_sky_directions(), SKY_SIDE)):
-            side = min(largest, detail)
+
+        def light_of(directions: Array, largest_side: int) -> Float32s:
+            """Return the mean light of lamps in some directions, with and without shadows [2 x n]."""
+            side = min(largest_side, detail)
             lamps = list(threads.map(partial(_lamp, casters, centre, radius, side), directions))
             mean_light = partial(_mean_light, lamps, 2.0 * LIFTED_PIXELS * radius / side)
-            pieces = zip(*((places[:, part], facing[:, part], map_offsets[:, part]) for part in parts), strict=True)
-            sums.append(np.concatenate(list(threads.map(mean_light, *pieces)), axis=1))
-    (sun, _), (sky, unhidden) = sums
-    return Light(sun, sky, np.where(unhidden > 0.0, sky / np.maximum(unhidden, 1e-6), 1.0))
+            pieces = zip(*((places[:, one], facing[:, one], map_offsets[:, one]) for one in blocks), strict=True)
+            return np.concatenate(list(threads.map(mean_light, *pieces)), axis=1)
+
+        sun, _ = light_of(_sun_directions(), SUN_SIDE)
+        sky, unhidden = light_of(_sky_directions(), SKY_SIDE)
+    return Light(sun, sky, np.where(unhidden > 0.0, sky / np.maximum(unhidden, NO_LIGHT), 1.0))
 
 
 def _lamp(casters: Triangles, centre: Array, radius: float, side: int, direction: Array) -> Lamp:
     """Make a lamp with a map [side x side] of the ball around all casters: the depths that are nearest to the lamp."""
+    # From base axes (m) to columns and rows of the map (pixels) and depth from the lamp (m): the ball fills the map but
+    # for its border, and lies at depths from one to three radii.
     axes = axes_towards(-direction)
     axes[:2] *= 0.5 * (side - 2 * MAP_BORDER) / radius
     shift = np.array([0.5 * side, 0.5 * side, 2.0 * radius]) - axes @ centre
@@ -127,7 +165,7 @@ def _lamp(casters: Triangles, centre: Array, radius: float, side: int, direction
         lit: Mask = nearest[row * side + column] <= np.float32(4.0 * radius) - on_map[2]
         return lit
 
-    return direction.astype(np.float32), reaches
+    return Lamp(direction.astype(np.float32), reaches)
 
 
 def _mean_light(
@@ -136,10 +174,10 @@ def _mean_light(
     """Return the mean light of lamps, with and without shadows [2 x n], on points [3 x n] lifted (m) off a surface."""
     lifted = points + normals * np.float32(lift)
     light = np.zeros((2, points.shape[1]), np.float32)
-    for number, (direction, reaches) in enumerate(lamps):
-        cosines = np.maximum(np.einsum("i,in->n", direction, normals), 0.0)
+    for number, lamp in enumerate(lamps):
+        cosines = np.maximum(np.einsum("i,in->n", lamp.direction, normals), 0.0)
         # Neighbours in the list of lamps look up in different places, so that their grain is not the same.
-        light[0] += cosines * reaches(lifted, map_offsets if number % 2 else -map_offsets[::-1])
+        light[0] += cosines * lamp.reaches(lifted, map_offsets if number % 2 else -map_offsets[::-1])
         light[1] += cosines
     return light / np.float32(len(lamps))
 
@@ -224,28 +262,6 @@ def srgb_of(light: Float32s) -> Float32s:
     return np.where(light <= 0.0031308, 12.92 * light, bright)
 
 
-GROUND_RADIUS = 1.7
-"""Radius of the ground that is drawn, in diagonals of the machine."""
-LARGEST_GROUND_MAP = 448
-"""Largest side of the ground's own map of light, points."""
-SUN_SHARE = 0.6
-"""Share of the main light in the light on open ground."""
-FAINTEST_SHADOW = 0.015
-"""Share of missing light below which the ground is simply bright."""
-EDGE_FADE = 0.12
-"""Share of the picture over which the ground fades towards each edge, so that pictures stand on a page unframed."""
-SHADOW_FADE = 1.0 / 3.0
-"""Share of the way from the rim of the ground to its centre on which shadows fade in: they do not end in a line."""
-GRID_FADE_POWER = 1.5
-"""Power of that way by which the ink of the grid grows: lines at the rim are fainter than shadows."""
-GRID_LINE_WIDTH = 1.1
-"""Width of the grid's lines, pixels."""
-MESHES_ACROSS = 8.0
-"""Meshes of the grid across the machine, about: their width is a power of ten, m."""
-LEAST_MESH_PIXELS = 1.0 / 0.35
-"""Pixels of a mesh below which its lines are fainter, because they crowd towards the horizon."""
-
-
 @dataclass(frozen=True)
 class Ground:
     """A level disc with a square map of light around its centre.
@@ -277,14 +293,7 @@ def veil_over(ground: Ground, light: Light, camera: Camera) -> tuple[Float32s, F
         camera: the camera of the picture.
     """
     x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-    rays = camera.rays(x, y)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        distance = (ground.centre[2] - camera.eye[2]) / rays[..., 2]
-        offsets = camera.eye[:2] + distance[..., None] * rays[..., :2] - ground.centre[:2]
-    radius = np.linalg.norm(offsets, axis=-1) / (GROUND_RADIUS * ground.size)
-    is_ground = (distance > 0.0) & (radius < 1.0)
-    offsets = np.where(is_ground[..., None], offsets, 0.0)
-    nearness = np.where(is_ground, 1.0 - np.minimum(radius, 1.0), 0.0)  # 1 below the machine, 0 at the rim
+    offsets, nearness = _seen_on_ground(ground, camera, x, y)
     edge = _inside(x / camera.width) * _inside(y / camera.height)
     map_places = (offsets[..., ::-1] / ground.size + 1.0) * 0.5 * (ground.side - 1)
     missing = map_coordinates(_missing(ground, light), np.moveaxis(map_places, -1, 0), order=1, mode="nearest")
@@ -292,6 +301,22 @@ def veil_over(ground: Ground, light: Light, camera: Camera) -> tuple[Float32s, F
     mesh_width = 10.0 ** round(math.log10(ground.size / MESHES_ACROSS))
     grid = _grid(offsets / mesh_width) * nearness**GRID_FADE_POWER * edge
     return shadow.astype(np.float32), grid.astype(np.float32)
+
+
+def _seen_on_ground(ground: Ground, camera: Camera, x: Array, y: Array) -> tuple[Array, Array]:
+    """Find the points of the ground that the places x, y of a picture (pixels) show.
+
+    Returns:
+        Their offsets from its centre, m [... x 2], and how near they are to it: 1 at the centre, 0 at the rim. Where
+        no ground is seen, both are 0.
+    """
+    rays = camera.rays(x, y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = (ground.centre[2] - camera.eye[2]) / rays[..., 2]
+        offsets = camera.eye[:2] + distance[..., None] * rays[..., :2] - ground.centre[:2]
+    radius = np.linalg.norm(offsets, axis=-1) / (GROUND_RADIUS * ground.size)
+    is_ground = (distance > 0.0) & (radius < 1.0)
+    return np.where(is_ground[..., None], offsets, 0.0), np.where(is_ground, 1.0 - np.minimum(radius, 1.0), 0.0)
 
 
 def _missing(ground: Ground, light: Light) -> Float32s:
@@ -302,7 +327,11 @@ def _missing(ground: Ground, light: Light) -> Float32s:
 
 
 def _inside(share: Array) -> Float32s:
-    """Return the rise from 0 at either edge of the picture to 1 well inside."""
+    """Return the rise from 0 at either edge of the picture to 1 well inside.
+
+    Args:
+        share: places between the edges, from 0 at the one to 1 at the other.
+    """
     return smooth_step(np.minimum(share, 1.0 - share), 0.0, EDGE_FADE)
 
 
@@ -315,8 +344,8 @@ def _grid(places: Array) -> Array:
     ink = np.zeros(places.shape[:2])
     for axis in range(2):
         across = places[..., axis]
-        pixel = np.maximum(np.hypot(*np.gradient(across)), 1e-9)  # meshes of a pixel
-        pixels_away = np.abs(across - np.round(across)) / pixel
+        meshes_per_pixel = np.maximum(np.hypot(*np.gradient(across)), LEAST_MESHES)
+        pixels_away = np.abs(across - np.round(across)) / meshes_per_pixel
         covered = np.clip(0.5 * GRID_LINE_WIDTH + 0.5 - pixels_away, 0.0, 1.0)
-        ink = np.maximum(ink, covered * np.clip(1.0 / (LEAST_MESH_PIXELS * pixel), 0.0, 1.0))
+        ink = np.maximum(ink, covered * np.clip(1.0 / (LEAST_MESH_PIXELS * meshes_per_pixel), 0.0, 1.0))
     return ink

@@ -141,12 +141,14 @@ def _without_slivers(points: Array, normals: Array, triangles: Integers) -> Mesh
     return Mesh(points[used], normals[used], numbers.reshape(-1, 3))
 
 
-def _joined_meshes(meshes: Sequence[Mesh]) -> Mesh:
-    starts = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
+def joined_meshes(meshes: Sequence[Mesh]) -> Mesh:
+    """Return all triangles of some meshes as one mesh, in their order; without meshes it is empty."""
+    ends = np.cumsum([len(mesh.points) for mesh in meshes])
+    shifted = [mesh.triangles + end - len(mesh.points) for mesh, end in zip(meshes, ends, strict=True)]
     return Mesh(
-        np.concatenate([mesh.points for mesh in meshes]),
-        np.concatenate([mesh.normals for mesh in meshes]),
-        np.concatenate([mesh.triangles + start for mesh, start in zip(meshes, starts, strict=False)]),
+        np.concatenate([np.empty((0, 3)), *(mesh.points for mesh in meshes)]),
+        np.concatenate([np.empty((0, 3)), *(mesh.normals for mesh in meshes)]),
+        np.concatenate([np.empty((0, 3), np.int64), *shifted]),
     )
 
 
@@ -162,7 +164,7 @@ def _extruded_mesh(shape: Extruded) -> Mesh:
     rings = np.stack([np.column_stack([corners, np.full(len(corners), height)]) for corners, height in flat])
     tilts = np.array([tilt for *_, tilt in rows])
     caps = [_cap(rings[-1], 1.0), _cap(rings[0], -1.0)]
-    return _joined_meshes([_wall(rings, tilts, _edge_normals(outline)), *caps])
+    return joined_meshes([_wall(rings, tilts, _edge_normals(outline)), *caps])
 
 
 def _edge_normals(outline: Array) -> Array:
@@ -257,7 +259,7 @@ def _swept_mesh(shape: Swept) -> Mesh:
     tube = _bands(points, np.stack([spokes[before], spokes[following]], axis=1), closed=True)
     if shape.closed:
         return tube
-    return _joined_meshes([tube, _disc(rings[0], -tangents[0]), _disc(rings[-1], tangents[-1])])
+    return joined_meshes([tube, _disc(rings[0], -tangents[0]), _disc(rings[-1], tangents[-1])])
 
 
 def _tangents(path: Array, closed: bool) -> Array:
