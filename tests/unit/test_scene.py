@@ -13,7 +13,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import changed, load
 from kinetostat.views.scene.anatomy import anatomy, proportions_of
 from kinetostat.views.scene.machine_scene import convex_hull, machine_scene, rounded_hull
-from kinetostat.views.scene.overlays import Deflection, compliance_overlays, deflection_overlays
+from kinetostat.views.scene.overlays import Deflection, compliance_overlays, deflection_overlays, exaggeration_of
 from kinetostat.views.scene.shapes import shaft
 from kinetostat.views.scene.solids import LAYERS, LOOKS, Turned, as_data
 from machines import every_machine
@@ -187,6 +187,19 @@ def test_the_ghost_is_exaggerated_by_a_round_factor_and_moves_with_the_tool():
     again, chosen = deflection_overlays(machine, response.configuration, sizes, moved, 7.0)
     assert chosen == 7.0
     assert {s.name for s in again} == {s.name for s in solids}
+
+
+@pytest.mark.parametrize("name", ["hexapod", "tricept"])
+def test_the_scene_and_the_figures_exaggerate_alike(name):
+    """The passive leg of a tricept ends its path far from the platform, which reaches only to its joints."""
+    machine = load(name)
+    response = respond(machine)
+    wrench = Wrench(Vector(0.0, 50.0, 0.0), ZERO)
+    motion = deflection(response.statics, wrench)
+    moved = Deflection(wrench, motion, tuple(deflected_links(response, wrench)))
+    sizes = proportions_of(machine, response.configuration)
+    _, factor = deflection_overlays(machine, response.configuration, sizes, moved)
+    assert factor == exaggeration_of(machine, response.configuration, moved, sizes.diagonal)
 
 
 def test_an_endless_deflection_has_no_ghost():

@@ -304,7 +304,8 @@ def overlay_of_motion(
         slack_legs: the names of the legs whose links are dashed.
     """
     configuration, (moved_colour, slack_colour) = response.configuration, figures.COLOURS[:2]
-    factor = overlays.exaggeration_of(response, motions, anatomy.proportions_of(machine, configuration).diagonal)
+    diagonal = anatomy.proportions_of(machine, configuration).diagonal
+    factor = overlays.exaggeration_of(machine, configuration, motions, diagonal)
     point = machine.tool_point(configuration.platform)
     motion = overlays.exaggerated_displacement(motions.motion, point, factor)
     heads = drawing.ring_of([leg.path[-1] for leg in configuration.legs if leg.actuated and leg.path])

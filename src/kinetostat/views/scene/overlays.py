@@ -1,7 +1,6 @@
-"""Overlays of an analysis over its machine: compliance ellipsoids, soft and free directions, load, deflected shape.
+"""Overlays of answers over their machine: compliance ellipsoids, soft and free directions, load, deflected shape.
 
-The symbols come first: their sizes are shares of the machine's diagonal, so that they are seen beside its legs. After
-them the answer of the machine is turned into symbols.
+The symbols stand first; then the overlays of each answer, which choose among them; and last the deflected shape.
 """
 
 import math
@@ -25,15 +24,40 @@ from kinetostat.views.scene import shapes
 from kinetostat.views.scene.anatomy import Proportions, anatomy
 from kinetostat.views.scene.leg_solids import joint_radius
 from kinetostat.views.scene.machine_scene import plates, tool_solids
-from kinetostat.views.scene.solids import Solid, Swept, Turned, solid_data, unit, upright
+from kinetostat.views.scene.solids import Solid, Swept, solid_data, unit, upright
 
 LARGEST_ELLIPSOID = {"translation": 0.16, "rotation": 0.11}
 """Longest semi-axis of an ellipsoid as a share of the machine's diagonal: it stands out and hides no leg."""
+THINNEST = 0.012
+"""Least semi-axis in units of the longest: an ellipsoid that is flat or thin can still be seen."""
+RING_RADIUS = 0.006
+"""Radius of the wire of the rings of an ellipsoid, as a share of the machine's diagonal."""
 DIRECTION_LENGTH, DIRECTION_RADIUS, TURN_RADIUS = 0.45, 0.006, 0.102
 """Length and thickness of the arrow along a direction, and radius of the one around it, as shares of the machine's
 diagonal: they end beside the legs."""
-THINNEST = 0.012
-"""Least semi-axis in units of the longest: an ellipsoid that is flat or thin can still be seen."""
+TURN_HEAD_RADIUS, TURN_HEAD_LENGTH = 2.8, 7.0
+"""Radius and length of the head of an arrow around a direction, in radii of its wire: a little more than those of a
+straight arrow (`shapes`), because most of it is seen foreshortened."""
+TURN_AXIS_LENGTH, TURN_AXIS_RADIUS = 0.6, 0.55
+"""Length and thickness of the axis of such an arrow, as shares of those of an arrow along a direction: the arrow around
+the axis counts."""
+DIRECTION_TURN, MOMENT_TURN = math.radians(290.0), math.radians(250.0)
+"""Angles of the arcs of arrows around a direction and around the axis of a moment: the gap shows where they begin."""
+LOAD_LENGTH, LOAD_RADIUS = 0.2, 0.008
+"""Length and thickness of the arrow of a force, as shares of the machine's diagonal: it is seen beside the tool."""
+MOMENT_RADIUS, MOMENT_WIRE = 0.45, 0.8
+"""Radius of the arrow of a moment in lengths of that of a force, and thickness of its wire in thicknesses of that."""
+SHOWN_DEFLECTION = 0.09
+"""Greatest displacement of an exaggerated shape as a share of the machine's diagonal: seen, and still the same
+machine."""
+ROUND_OFF_OF_FACTOR = 1.0001
+"""Ratio by which a factor may show more than that: one that is round already does not fall to the next by round-off."""
+ROUND_STEPS = (1.0, 2.0, 5.0)
+"""Round factors of exaggeration within each power of ten."""
+GHOST_WIDTH = 0.7
+"""Radius of a deflected link, in radii of its leg: the leg and the link can both be seen where they cross."""
+GHOST_POINTS = 12
+"""Pieces of a deflected link: enough for a beam that bends both ways."""
 
 
 def ellipsoid_solids(block: str, principal: Principal, point: Vector, sizes: Proportions) -> list[Solid]:
@@ -45,22 +69,22 @@ def ellipsoid_solids(block: str, principal: Principal, point: Vector, sizes: Pro
     if largest <= 0.0:
         return []
     longest = LARGEST_ELLIPSOID[block] * sizes.diagonal
-    axes = _three(principal.directions)
+    axes = _axes_along(principal.directions)
     shares = [*(c / largest for c in principal.compliances), *[0.0] * (3 - len(principal.compliances))]
     axis_lengths = [longest * max(share, THINNEST) for share in shares]
     place = Displacement(axes, point)
     if block == "translation":
         radii = (axis_lengths[0], axis_lengths[1], axis_lengths[2])
         return [Solid("ellipsoid of translation", shapes.ball(1.0), block, place, radii, "ellipsoids")]
-    wire = 0.006 * sizes.diagonal
+    wire = RING_RADIUS * sizes.diagonal
     return [
         Solid(f"ellipsoid of rotation/ring {n}", _ellipse(i, j, axis_lengths, wire), block, place, layer="ellipsoids")
         for n, (i, j) in enumerate(((0, 1), (1, 2), (0, 2)), 1)
     ]
 
 
-def _three(directions: Array) -> Rotation:
-    """Return right-handed axes along up to three directions."""
+def _axes_along(directions: Array) -> Rotation:
+    """Return right-handed axes along one to three perpendicular directions; they begin with these."""
     axes = [Vector(*direction) for direction in directions]
     first = axes[0]
     second = axes[1] if len(axes) > 1 else upright(ZERO, first).rotation.x
@@ -68,6 +92,7 @@ def _three(directions: Array) -> Rotation:
 
 
 def _ellipse(i: int, j: int, lengths: Sequence[float], wire: float) -> Swept:
+    """Return the ellipse of an ellipsoid in the plane of its axes i and j, as a wire of a radius, m."""
     path = []
     for n in range(2 * shapes.HALF_CIRCLE_POINTS):
         point = [0.0, 0.0, 0.0]
@@ -109,47 +134,42 @@ def _straight_arrow(name: str, material: str, axis: Vector, point: Vector, sizes
 def _turning_arrow(name: str, material: str, axis: Vector, point: Vector, sizes: Proportions) -> list[Solid]:
     """Return an arrow around an axis through a point, and the axis as a thinner one."""
     length, radius = DIRECTION_LENGTH * sizes.diagonal, DIRECTION_RADIUS * sizes.diagonal
-    place, head = upright(point, axis), shapes.cone(2.8 * radius, 0.0, 7.0 * radius)
-    bent = _bent_arrow(
-        (name, f"{name}/head"), TURN_RADIUS * sizes.diagonal, math.radians(290), radius, head, material, place
-    )
-    straight = Solid(f"{name}/axis", shapes.double_arrow(0.6 * length, 0.55 * radius), material, place)
-    return [replace(solid, layer="directions") for solid in (*bent, straight)]
+    place, head = upright(point, axis), shapes.cone(TURN_HEAD_RADIUS * radius, 0.0, TURN_HEAD_LENGTH * radius)
+    arc = shapes.arc(TURN_RADIUS * sizes.diagonal, DIRECTION_TURN, radius)
+    bent = [Solid(name, arc, material, place)]
+    bent.append(Solid(f"{name}/head", head, material, _end_of_arc(TURN_RADIUS * sizes.diagonal, DIRECTION_TURN, place)))
+    line = shapes.double_arrow(TURN_AXIS_LENGTH * length, TURN_AXIS_RADIUS * radius)
+    return [replace(solid, layer="directions") for solid in (*bent, Solid(f"{name}/axis", line, material, place))]
 
 
 def load_solids(load: Wrench, point: Vector, sizes: Proportions) -> list[Solid]:
     """Draw the wrench on the tool: a straight arrow that ends there, and one around the axis of the moment."""
     solids = []
-    size, thick = 0.2 * sizes.diagonal, 0.008 * sizes.diagonal
+    length, thickness = LOAD_LENGTH * sizes.diagonal, LOAD_RADIUS * sizes.diagonal
     if load.translational.norm() > 0.0:
         along = unit(load.translational)
-        solids.append(Solid("load/force", shapes.arrow(size, thick), "load", upright(point - along * size, along)))
+        arrow = shapes.arrow(length, thickness)
+        solids.append(Solid("load/force", arrow, "load", upright(point - along * length, along)))
     if load.rotational.norm() > 0.0:
-        names, place = ("load/moment", "load/moment head"), upright(point, load.rotational)
-        head = shapes.cone(2.6 * thick, 0.0, 6.0 * thick)
-        solids += _bent_arrow(names, 0.45 * size, math.radians(250), 0.8 * thick, head, "load", place)
+        place, radius = upright(point, load.rotational), MOMENT_RADIUS * length
+        arc = shapes.arc(radius, MOMENT_TURN, MOMENT_WIRE * thickness)
+        head = shapes.cone(shapes.HEAD_RADIUS * thickness, 0.0, shapes.HEAD_LENGTH * thickness)
+        solids.append(Solid("load/moment", arc, "load", place))
+        solids.append(Solid("load/moment head", head, "load", _end_of_arc(radius, MOMENT_TURN, place)))
     return [replace(solid, layer="load") for solid in solids]
 
 
-def _bent_arrow(
-    names: tuple[str, str], radius: float, turn: float, wire: float, head: Turned, material: str, place: Displacement
-) -> list[Solid]:
-    """Return an arrow around the z axis of a place: an arc over the angle `turn`, and a head at its end."""
+def _end_of_arc(radius: float, turn: float, place: Displacement) -> Displacement:
+    """Return the place of an arrow's head at the end of an arc.
+
+    Args:
+        radius: radius of the arc about the z axis of its place, m.
+        turn: angle of the arc from the x axis of its place, rad.
+        place: place of the arc.
+    """
     tip = place.apply(Vector(radius * math.cos(turn), radius * math.sin(turn), 0.0))
     heading = place.rotation.apply(Vector(-math.sin(turn), math.cos(turn), 0.0))
-    return [
-        Solid(names[0], shapes.arc(radius, turn, wire), material, place),
-        Solid(names[1], head, material, upright(tip, heading)),
-    ]
-
-
-SHOWN_DEFLECTION = 0.09
-"""Greatest displacement of an exaggerated shape as a share of the machine's diagonal: seen, and still the same
-machine."""
-GHOST_WIDTH = 0.7
-"""Radius of a deflected link, in radii of its leg: the leg and the link can both be seen where they cross."""
-GHOST_POINTS = 12
-"""Points along a deflected link: enough for a beam that bends both ways."""
+    return upright(tip, heading)
 
 
 def overlays_of(
@@ -192,8 +212,9 @@ def loaded_overlays(
         return [], None
     response = state.state.free
     motions = motions_of(state, response)
-    chosen = factor or exaggeration_of(response, motions, sizes.diagonal)
-    return deflection_overlays(state.machine, response.configuration, sizes, motions, chosen)
+    if factor is None:
+        factor = exaggeration_of(state.machine, response.configuration, motions, sizes.diagonal)
+    return deflection_overlays(state.machine, response.configuration, sizes, motions, factor)
 
 
 def motions_of(state: LoadedState, response: Response) -> Deflection:
@@ -203,17 +224,16 @@ def motions_of(state: LoadedState, response: Response) -> Deflection:
     return Deflection(response.load, Twist(Vector(*amounts[:3]), Vector(*amounts[3:])), state.links)
 
 
-def exaggeration_of(response: Response, motions: Deflection, diagonal: float) -> float:
+def exaggeration_of(machine: Machine, configuration: Configuration, motions: Deflection, diagonal: float) -> float:
     """Return a round factor, at least 1, that makes the motions of a loaded machine visible.
 
     Args:
-        response: the response of the machine at its unloaded pose.
+        machine, configuration: the machine at its unloaded pose, as for `machine_scene`.
         motions: the displacements from that pose.
         diagonal: the diagonal of the machine, m.
     """
-    legs, point = response.configuration.legs, response.reference
-    reach = max(((leg.path[-1] - point).norm() for leg in legs if leg.path), default=0.0)
-    return max(1.0, _exaggeration(motions, float(reach), diagonal))
+    heads = [anatomy(leg).head for leg in configuration.legs]
+    return max(1.0, _exaggeration(motions, _reach(heads, machine.tool_point(configuration.platform)), diagonal))
 
 
 def compliance_overlays(
@@ -245,11 +265,12 @@ def deflection_overlays(
         factor: the factor of exaggeration; None to choose a round one.
     """
     loads = load_solids(motions.load, machine.tool_point(configuration.platform), sizes)
-    if not _finite(motions):
-        return loads, 1.0
     parts = _moving_parts(machine, configuration, sizes)
-    chosen = factor or _exaggeration(motions, parts.reach, sizes.diagonal)
-    return [*loads, *_ghost(motions, parts, chosen)], chosen
+    if not math.isfinite(_greatest_displacement(motions, parts.reach)):
+        return loads, 1.0
+    if factor is None:
+        factor = _exaggeration(motions, parts.reach, sizes.diagonal)
+    return [*loads, *_ghost(motions, parts, factor)], factor
 
 
 def swing_data(
@@ -266,10 +287,10 @@ def swing_data(
         motions: small motions, of any size.
     """
     parts = _moving_parts(machine, configuration, sizes)
-    largest = _largest(motions, parts.reach)
-    if not 0.0 < largest < math.inf:
+    greatest = _greatest_displacement(motions, parts.reach)
+    if not 0.0 < greatest < math.inf:
         return []
-    factor = SHOWN_DEFLECTION * sizes.diagonal / largest
+    factor = SHOWN_DEFLECTION * sizes.diagonal / greatest
     solids = []
     for first, middle, last in zip(*(_ghost(motions, parts, share) for share in (factor, 0.0, -factor)), strict=True):
         ends = [solid_data(end)["place"] for end in (first, last)]
@@ -301,13 +322,13 @@ def _moving_parts(machine: Machine, configuration: Configuration, sizes: Proport
     point, legs = machine.tool_point(configuration.platform), [anatomy(leg) for leg in configuration.legs]
     _, platform = plates(configuration, legs, sizes.leg)
     body = [*platform.solids(), *tool_solids(machine, configuration, platform, sizes.leg)]
-    reach = max((joint - point).norm() for joint in platform.joints)
-    return _MovingParts(body, point, float(reach), {leg.leg: joint_radius(leg, sizes) for leg in legs})
+    radii = {leg.leg: joint_radius(leg, sizes) for leg in legs}
+    return _MovingParts(body, point, _reach(platform.joints, point), radii)
 
 
-def _finite(motions: Deflection) -> bool:
-    numbers = [*motions.motion.components(), *(c for link in motions.links for c in link.end_motion.components())]
-    return all(math.isfinite(c) for c in numbers)
+def _reach(joints: Sequence[Vector], point: Vector) -> float:
+    """Return the greatest distance of the joints of a platform from the tool point, m."""
+    return float(max((joint - point).norm() for joint in joints))
 
 
 def _exaggeration(motions: Deflection, reach: float, diagonal: float) -> float:
@@ -318,19 +339,21 @@ def _exaggeration(motions: Deflection, reach: float, diagonal: float) -> float:
         reach: the reach of the platform from the tool point, m.
         diagonal: the diagonal of the machine, m.
     """
-    largest = _largest(motions, reach)
-    if not 0.0 < largest < math.inf:
+    greatest = _greatest_displacement(motions, reach)
+    if not 0.0 < greatest < math.inf:
         return 1.0
-    # A little more is allowed, so that a factor that is round already does not fall to the next one by round-off.
-    most = 1.0001 * SHOWN_DEFLECTION * diagonal / largest
+    most = ROUND_OFF_OF_FACTOR * SHOWN_DEFLECTION * diagonal / greatest
     power = 10.0 ** math.floor(math.log10(most))
-    return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= most)
+    return max(step * power for step in ROUND_STEPS if step * power <= most)
 
 
-def _largest(motions: Deflection, reach: float) -> float:
-    """Return the greatest displacement of all ends of links and of the platform, m."""
-    links = [motion.translational.norm() for link in motions.links for motion in (link.start_motion, link.end_motion)]
-    return max([*links, motions.motion.translational.norm() + motions.motion.rotational.norm() * reach])
+def _greatest_displacement(motions: Deflection, reach: float) -> float:
+    """Return the greatest displacement of all ends of links and of the platform, m; infinite where any motion is."""
+    twists = [motion for link in motions.links for motion in (link.start_motion, link.end_motion)]
+    if not all(math.isfinite(part) for twist in (motions.motion, *twists) for part in twist.components()):
+        return math.inf
+    of_platform = motions.motion.translational.norm() + motions.motion.rotational.norm() * reach
+    return max([of_platform, *(twist.translational.norm() for twist in twists)])
 
 
 def _ghost(motions: Deflection, parts: _MovingParts, factor: float) -> list[Solid]:

@@ -14,6 +14,12 @@ COIL_TURN_POINTS = 18
 """Points of a turn of a coil, which is small: it looks round."""
 CORNER_POINTS = 8
 """Points of a rounded corner, a quarter of a circle: it looks round."""
+CUP_RADIUS, RIM_RADIUS = 1.22, 1.02
+"""Outer radius and rim of the cup around a ball, in radii of the ball: the ball is seen to move in it."""
+HEAD_RADIUS, HEAD_LENGTH = 2.6, 6.0
+"""Radius and length of an arrow's head, in radii of its shaft: it is seen as a point, and not as a ball."""
+MOST_HEAD_SHARE = 0.4
+"""Length of all heads of an arrow as a share of its length, at most: some of the shaft is left of a short one."""
 
 shared = lru_cache(512)
 """Decorator: a shape that does not change while a machine moves is one object, whose mesh is made once."""
@@ -22,7 +28,7 @@ shared = lru_cache(512)
 @shared
 def shaft(radius: float, length: float, chamfer: float = 0.0, start: float = 0.0) -> Turned:
     """Return a cylinder about z from height `start`, its ends chamfered."""
-    c = min(chamfer, 0.5 * radius, 0.45 * length)
+    c = min(chamfer, 0.5 * radius, 0.45 * length)  # some of the faces is left, however thin or short the shaft is
     end = start + length
     return Turned(
         ((0.0, start), (radius - c, start), (radius, start + c), (radius, end - c), (radius - c, end), (0.0, end))
@@ -61,8 +67,8 @@ def waist(radius: float, neck: float, length: float) -> Turned:
 def socket(radius: float) -> Turned:
     """Return a cup around the lower half of a ball of this radius, with its stem towards -z."""
     angles = [math.radians(a) for a in range(-60, 21, 10)]
-    outer = [(1.22 * radius * math.cos(a), 1.22 * radius * math.sin(a)) for a in angles]
-    rim = (1.02 * radius * math.cos(angles[-1]), 1.02 * radius * math.sin(angles[-1]))
+    outer = [(CUP_RADIUS * radius * math.cos(a), CUP_RADIUS * radius * math.sin(a)) for a in angles]
+    rim = (RIM_RADIUS * radius * math.cos(angles[-1]), RIM_RADIUS * radius * math.sin(angles[-1]))
     return Turned(((0.0, outer[0][1]), *outer, rim, (0.0, rim[1])))
 
 
@@ -127,14 +133,13 @@ def arc(radius: float, turn: float, wire: float) -> Swept:
 @shared
 def arrow(length: float, radius: float) -> Turned:
     """Return an arrow along z from the origin."""
-    head = min(0.4 * length, 6.0 * radius)
-    neck = length - head
-    return Turned(((0.0, 0.0), (radius, 0.0), (radius, neck), (2.6 * radius, neck), (0.0, length)))
+    neck = length - min(MOST_HEAD_SHARE * length, HEAD_LENGTH * radius)
+    return Turned(((0.0, 0.0), (radius, 0.0), (radius, neck), (HEAD_RADIUS * radius, neck), (0.0, length)))
 
 
 @shared
 def double_arrow(length: float, radius: float) -> Turned:
     """Return an arrow along z with a head at either end, centred at the origin."""
-    half, head = 0.5 * length, min(0.2 * length, 6.0 * radius)
-    neck, wide = half - head, 2.6 * radius
+    half, wide = 0.5 * length, HEAD_RADIUS * radius
+    neck = half - min(MOST_HEAD_SHARE * half, HEAD_LENGTH * radius)
     return Turned(((0.0, -half), (wide, -neck), (radius, -neck), (radius, neck), (wide, neck), (0.0, half)))
