@@ -15,7 +15,7 @@ from kinetostat.views.scene.anatomy import anatomy, proportions_of
 from kinetostat.views.scene.machine_scene import convex_hull, machine_scene, rounded_hull
 from kinetostat.views.scene.overlays import Deflection, compliance_overlays, deflection_overlays, exaggeration_of
 from kinetostat.views.scene.shapes import shaft
-from kinetostat.views.scene.solids import LAYERS, LOOKS, Turned, as_data
+from kinetostat.views.scene.solids import LAYERS, LOOKS, Extruded, Turned, as_data
 from machines import every_machine
 
 
@@ -187,6 +187,34 @@ def test_the_ghost_is_exaggerated_by_a_round_factor_and_moves_with_the_tool():
     again, chosen = deflection_overlays(machine, response.configuration, sizes, moved, 7.0)
     assert chosen == 7.0
     assert {s.name for s in again} == {s.name for s in solids}
+
+
+COPIED = """schema = 1
+name = "Planar 3-RRR"
+family = "legs"
+space = "planar"
+platform = { point = [0, 0, 0] }
+pose = { x = 0, y = 0, yaw = 0 }
+sections = { bar = { shape = "rectangle", width = "60 mm", height = "40 mm", material = "aluminium" } }
+[[legs]]
+name = "leg"
+copies = 3
+joints = [
+  { name = "drive", type = "revolute", joins = ["base", "crank"], point = [0.2, 0, 0], axis = [0, 0, 1], \
+actuated = true, stiffness = 1e4 },
+  { name = "elbow", type = "revolute", joins = ["crank", "rod"], point = [0.14, 0.1, 0], axis = [0, 0, 1] },
+  { name = "wrist", type = "revolute", joins = ["rod", "platform"], point = [0.05, 0, 0], axis = [0, 0, 1] },
+]
+links = { crank = { model = "beam", section = "bar", up = [0, 0, 1] } }
+"""
+
+
+def test_links_of_copied_legs_have_the_section_of_the_leg_that_is_written(tmp_path):
+    (tmp_path / "copied.toml").write_text(COPIED)
+    solids = {s.name: s for s in scene_of(load(tmp_path / "copied.toml")).solids}
+    for number in (1, 2, 3):
+        assert isinstance(solids[f"leg {number} crank/bar"].shape, Extruded)
+        assert isinstance(solids[f"leg {number} link 2/bar"].shape, Turned)
 
 
 @pytest.mark.parametrize("name", ["hexapod", "tricept"])

@@ -8,7 +8,7 @@ from kinetostat.machine.loading import load
 from kinetostat.views.scene import shapes
 from kinetostat.views.scene.machine_scene import scene_of
 from kinetostat.views.scene.mesh import placed_mesh
-from kinetostat.views.scene.solids import BASE, LOOKS, Scene, Solid, linear
+from kinetostat.views.scene.solids import BASE, LOOKS, Scene, Solid, linear_rgb
 from machines import one_of_each
 
 pytest.importorskip("OCP.STEPCAFControl", reason="Open CASCADE does not start", exc_type=ImportError)
@@ -97,7 +97,7 @@ def test_looks_are_kept(read):
     found = read(scene_with(*(Solid(f"base/{name}", shapes.ball(0.1), name) for name in names)))
     assert [one.part for one in found] == ["steel", "actuated", "removed"]
     for one in found:
-        assert one.color == pytest.approx(linear(LOOKS[one.part].color), abs=1e-6)
+        assert one.color == pytest.approx(linear_rgb(LOOKS[one.part].color), abs=1e-6)
         assert one.opacity == pytest.approx(LOOKS[one.part].opacity)
 
 

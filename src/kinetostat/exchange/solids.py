@@ -24,7 +24,7 @@ from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.storage import write_bytes
 from kinetostat.views.scene.machine_scene import scene_of
 from kinetostat.views.scene.mesh import mesh_of
-from kinetostat.views.scene.solids import LOOKS, Look, Scene, Shape, Solid, columns_of, linear
+from kinetostat.views.scene.solids import LOOKS, Look, Scene, Shape, Solid, linear_rgb, matrix_columns
 
 FLOAT, SHORT, INTEGER = 5126, 5123, 5125
 """Component types of glTF: float32, uint16, uint32 (section 3.6.2)."""
@@ -106,14 +106,14 @@ class _Buffer:
 
 def _node(solid: Solid, mesh: int) -> dict[str, Any]:
     """Return a solid at its place: the columns of its 4 x 4 matrix."""
-    *axes, origin = (list(map(float, column.components())) for column in columns_of(solid))
+    *axes, origin = (list(map(float, column.components())) for column in matrix_columns(solid))
     matrix = [number for axis in axes for number in (*axis, 0.0)]
     return {"name": solid.name, "mesh": mesh, "matrix": [*matrix, *origin, 1.0]}
 
 
 def _material(name: str, look: Look) -> dict[str, Any]:
     surface = {
-        "baseColorFactor": [*linear(look.color), look.opacity],
+        "baseColorFactor": [*linear_rgb(look.color), look.opacity],
         "metallicFactor": look.metalness,
         "roughnessFactor": look.roughness,
     }

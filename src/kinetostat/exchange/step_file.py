@@ -66,7 +66,7 @@ from kinetostat.views.scene.solids import (
     Solid,
     Swept,
     Turned,
-    linear,
+    linear_rgb,
     solid_data,
 )
 
@@ -298,7 +298,7 @@ def _text(text: str) -> TCollection_ExtendedString:
 
 def _color(material: str) -> Quantity_ColorRGBA:
     look = LOOKS[material]
-    return Quantity_ColorRGBA(Quantity_Color(*linear(look.color), Quantity_TOC_RGB), look.opacity)
+    return Quantity_ColorRGBA(Quantity_Color(*linear_rgb(look.color), Quantity_TOC_RGB), look.opacity)
 
 
 def _location(place: Displacement) -> TopLoc_Location:

@@ -18,7 +18,7 @@ from kinetostat.engine.batch import available_cores
 from kinetostat.frozen import dataclass
 from kinetostat.views.rendering.camera import Camera, axes_towards
 from kinetostat.views.rendering.visibility import Triangles, nearest_triangles
-from kinetostat.views.scene.solids import LOOKS, linear
+from kinetostat.views.scene.solids import LOOKS, linear_rgb
 
 SUN = np.array((-0.55, -0.75, 1.5)) / math.sqrt(0.55**2 + 0.75**2 + 1.5**2)
 """Direction to the main light, base axes: over the left shoulder of a viewer in front."""
@@ -139,7 +139,9 @@ def light_on(points: Array, normals: Array, casters: Triangles, detail: int) -> 
             side = min(largest_side, detail)
             lamps = list(threads.map(partial(_lamp, casters, centre, radius, side), directions))
             mean_light = partial(_mean_light, lamps, 2.0 * LIFTED_PIXELS * radius / side)
-            pieces = zip(*((places[:, one], facing[:, one], map_offsets[:, one]) for one in blocks), strict=True)
+            pieces = zip(
+                *((places[:, block], facing[:, block], map_offsets[:, block]) for block in blocks), strict=True
+            )
             return np.concatenate(list(threads.map(mean_light, *pieces)), axis=1)
 
         sun, _ = light_of(_sun_directions(), SUN_SIDE)
@@ -215,7 +217,7 @@ def shaded_colors(look: Integers, normals: Float32s, to_eye: Float32s, light: Li
         light: the light on the points.
     """
     looks = LOOKS.values()
-    color = np.array([linear(entry.color) for entry in looks], dtype=np.float32)[look]
+    color = np.array([linear_rgb(entry.color) for entry in looks], dtype=np.float32)[look]
     metal = np.array([[entry.metalness] for entry in looks], dtype=np.float32)[look]
     roughness = np.array([[entry.roughness] for entry in looks], dtype=np.float32)[look]
     mirrored = DIELECTRIC * (1.0 - metal) + color * metal

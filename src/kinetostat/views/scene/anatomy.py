@@ -7,7 +7,7 @@ machine. Nothing is drawn here.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias, cast
 
 from kinetostat.algebra.scalar import is_zero
 from kinetostat.algebra.vector import AXES, ZERO, Vector
@@ -25,6 +25,8 @@ LinkKind: TypeAlias = Literal["bar", "telescope", "bars", "cable"]
 SPRING_PLACE = 0.65
 """Place of a linear spring on the way to the next point, as a share of it: on the rod of a telescope, beyond its
 cylinder."""
+LEG_RADIUS = 0.0125
+"""Radius of a leg as a share of the machine's diagonal, where the file does not say how thick it is: by eye."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,8 @@ class Anatomy:
     Attributes:
         leg: name.
         label: what a drawing writes beside it.
-        actuated: whether it has an actuator; `removed` if all of those are without stiffness.
+        actuated: whether it has an actuator.
+        removed: whether it has actuators, and all of these are without stiffness: it is drawn as not there.
         joints, links, rails, springs: the parts of the leg in order.
         foot, head: the points on the base and on the platform between which it stands, base frame, m.
     """
@@ -123,7 +126,7 @@ class Anatomy:
     @property
     def on_rail(self) -> bool:
         """Whether it begins with a slide along the base."""
-        return any(together(rail.point, self.foot) for rail in self.rails)
+        return any(coincide(rail.point, self.foot) for rail in self.rails)
 
 
 def anatomy(leg: Leg) -> Anatomy:
@@ -137,11 +140,11 @@ def anatomy(leg: Leg) -> Anatomy:
         label=leg.label,
         actuated=bool(drives),
         removed=bool(drives) and all(is_zero(spring.stiffness) for spring in drives),
-        joints=tuple(joint for joint in reader.joints if not _within_bars(joint, reader.links)),
+        joints=tuple(joint for joint in reader.joints if not _is_end_of_bars(joint, reader.links)),
         links=tuple(reader.links),
         rails=tuple(reader.finished_rails()),
         springs=tuple(reader.springs),
-        foot=reader.foot or ZERO,
+        foot=reader.foot or ZERO,  # a chain of slides alone has no point
         head=reader.head or ZERO,
     )
 
@@ -212,8 +215,8 @@ class _ChainReader:
     def _go_to(self, point: Vector) -> None:
         """Go on to a point: what lies between is a link, or a slide, which is a telescope or runs along a rail."""
         start = self.head or point
-        slide, is_apart = self.slide, not together(start, point)
-        telescopes = slide is not None and is_apart and _along(slide.axis, point - start)
+        slide, is_apart = self.slide, not coincide(start, point)
+        telescopes = slide is not None and is_apart and _is_along(slide.axis, point - start)
         if slide is not None and telescopes:
             pulls = any(spring.acts == "pulls" for spring in self.leg.springs)
             kind: LinkKind = "cable" if pulls else "telescope"
@@ -233,7 +236,7 @@ class _ChainReader:
     def _add_axis(self, joint: Joint) -> None:
         """Add a joint about one axis, or a further axis to the joint that has this name and place."""
         last = self.joints[-1] if self.joints else None
-        if last is not None and last.name == joint.name and together(last.point, _point(joint)):
+        if last is not None and last.name == joint.name and coincide(last.point, _point(joint)):
             self.joints[-1] = _kind_of(replace(last, axes=(*last.axes, joint.axis)), self.leg)
         else:
             kind: JointKind = "revolute" if is_zero(joint.pitch) else "helical"
@@ -260,7 +263,7 @@ def _kind_of(joint: JointPart, leg: Leg) -> JointPart:
     """Return a joint with one more axis. Of the two spherical joints of a strut the lower is drawn as a Hooke joint."""
     if len(joint.axes) == 2:
         return replace(joint, kind="universal")
-    if len(leg.lines) == 1 and together(joint.point, _lower_end(leg)):
+    if len(leg.lines) == 1 and coincide(joint.point, _lower_end(leg)):
         strut = leg.lines[0].direction
         across = unit(strut.cross(_axis_far_from(strut)))
         return replace(joint, kind="universal", axes=(across, unit(strut.cross(across))))
@@ -281,27 +284,24 @@ def _spring_part(spring: Spring, point: Vector) -> SpringPart:
     return SpringPart(spring.name, point, spring.joint.axis, spring.joint.point is not None, float(spring.stiffness))
 
 
-def _within_bars(joint: JointPart, links: Sequence[LinkPart]) -> bool:
+def _is_end_of_bars(joint: JointPart, links: Sequence[LinkPart]) -> bool:
     """Return whether a joint is drawn already as the balls of a pair of bars."""
     return any(
         link.kind == "bars"
         and not link.pinned
-        and (together(joint.point, link.start) or together(joint.point, link.end))
+        and (coincide(joint.point, link.start) or coincide(joint.point, link.end))
         for link in links
     )
 
 
-def together(first: Vector, second: Vector) -> bool:
+def coincide(first: Vector, second: Vector) -> bool:
     """Return whether two points are the same to the eye."""
     return (first - second).norm() < SAME_TO_THE_EYE
 
 
-def _along(axis: Vector, span: Vector) -> bool:
+def _is_along(axis: Vector, span: Vector) -> bool:
+    """Return whether a unit vector lies along a span, in either sense, to the eye."""
     return span.cross(axis).norm() < SAME_TO_THE_EYE * span.norm()
-
-
-LEG_RADIUS = 0.0125
-"""Radius of a leg as a share of the machine's diagonal, where the file does not say how thick it is."""
 
 
 @dataclass(frozen=True)
@@ -331,41 +331,50 @@ class Proportions:
     diagonal: float
 
 
-def diagonal(configuration: Configuration) -> float:
-    """Return the diagonal of the box around P and all joints that the pose places, m."""
-    points = [p for leg in configuration.legs for p in leg.path] + [configuration.platform.translation]
-    placed = [p for p in points if all(math.isfinite(c) for c in p.components())]
+def diagonal_of(configuration: Configuration) -> float:
+    """Return the diagonal of the box around P and all joints that the pose places, m.
+
+    A machine whose joints lie in one point has its characteristic length instead.
+    """
+    points = [point for leg in configuration.legs for point in leg.path] + [configuration.platform.translation]
+    placed = [point for point in points if all(math.isfinite(c) for c in point.components())]
     low, high = bounds(placed) if placed else (ZERO, ZERO)
     return math.hypot(*(high - low).components()) or float(configuration.length)
 
 
-def leg_radius(machine: Machine, size: float) -> float:
-    """Return the radius of the legs, m: half their diameter in [limits], if it is there."""
+def _leg_radius(machine: Machine, diagonal: float) -> float:
+    """Return the radius of the legs, m: half of their diameter in [limits], or a share of the diagonal without it."""
     diameter = machine.tables["limits"].leg_diameter
-    return 0.5 * diameter if is_set(diameter) else LEG_RADIUS * size
+    return 0.5 * diameter if is_set(diameter) else LEG_RADIUS * diagonal
 
 
 def cross_sections_of(machine: Machine) -> dict[str, Profile]:
-    """Return the cross-sections of a machine written leg by leg, by the name of the link."""
-    profiles = {}
-    for table, entries in machine.family.literals.items():
-        parts = table.split(".", 2)
-        section = entries.get("section")
-        if parts[0] == "legs" and section:
-            shape = machine.family.literals[f"sections.{section}"]["shape"]
-            profiles[f"{parts[1]} {parts[2]}"] = _profile(str(shape), machine.tables[f"sections.{section}"])
+    """Return the cross-sections of a machine written leg by leg, by the name of the link; other machines have none.
+
+    A leg of the file that is copied has one set of numbers, and copies with names of their own: "leg 1", "leg 2", ...
+    """
+    profiles, literals = {}, machine.family.literals
+    for table, entries in literals.items():
+        room, _, leg_and_link = table.partition(".")  # such as legs.strut 1.rod
+        if room == "legs" and (section := entries.get("section")):
+            leg, _, link = leg_and_link.partition(".")
+            count = cast("int", literals.get(f"legs.{leg}", {}).get("copies", 0))
+            profile = _profile(str(literals[f"sections.{section}"]["shape"]), machine.tables[f"sections.{section}"])
+            for name in [f"{leg} {number}" for number in range(1, count + 1)] or [leg]:
+                profiles[f"{name} {link}"] = profile
     return profiles
 
 
-def _profile(shape: str, data: Any) -> Profile:
+def _profile(shape: str, section: Any) -> Profile:
+    """Return the outer size of a cross-section by its shape; any other one is drawn round, with the same area."""
     match shape:
         case "round":
-            return Profile(data.diameter)
+            return Profile(section.diameter)
         case "tube":
-            return Profile(data.outer_diameter)
+            return Profile(section.outer_diameter)
         case "rectangle":
-            return Profile(data.width, data.height)
-    return Profile(2.0 * math.sqrt(data.area / math.pi))
+            return Profile(section.width, section.height)
+    return Profile(2.0 * math.sqrt(section.area / math.pi))
 
 
 def bounds(points: Sequence[Vector]) -> tuple[Vector, Vector]:
@@ -377,11 +386,11 @@ def bounds(points: Sequence[Vector]) -> tuple[Vector, Vector]:
 def proportions_of(machine: Machine, configuration: Configuration) -> Proportions:
     """Return the sizes to draw a machine with, from its pose when it is loaded; they stay while it moves."""
     legs = [anatomy(leg) for leg in configuration.legs]
-    size = diagonal(configuration)
+    diagonal = diagonal_of(configuration)
     return Proportions(
-        leg_radius(machine, size),
-        cross_sections_of(machine),
-        {link.name: link.span.norm() for leg in legs for link in leg.links},
-        {rail.name: rail.point for leg in legs for rail in leg.rails},
-        size,
+        leg=_leg_radius(machine, diagonal),
+        cross_sections=cross_sections_of(machine),
+        spans={link.name: link.span.norm() for leg in legs for link in leg.links},
+        carriages={rail.name: rail.point for leg in legs for rail in leg.rails},
+        diagonal=diagonal,
     )

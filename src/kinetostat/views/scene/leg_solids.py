@@ -17,7 +17,7 @@ from kinetostat.views.scene.anatomy import (
     Proportions,
     RailPart,
     SpringPart,
-    together,
+    coincide,
 )
 from kinetostat.views.scene.solids import Extruded, Solid, Swept, Turned, unit, upright
 
@@ -69,8 +69,8 @@ def joint_radius(leg: Anatomy, sizes: Proportions) -> float:
 
 def _neighbours(joint: JointPart, leg: Anatomy, up: Vector | None, down: Vector) -> tuple[Vector, Vector]:
     """Return the vectors from a joint to the part before it and to the part after it in its leg: a link, or a plate."""
-    before = next((link.start - joint.point for link in leg.links if together(link.end, joint.point)), None)
-    after = next((link.end - joint.point for link in leg.links if together(link.start, joint.point)), None)
+    before = next((link.start - joint.point for link in leg.links if coincide(link.end, joint.point)), None)
+    after = next((link.end - joint.point for link in leg.links if coincide(link.start, joint.point)), None)
     if before is None and up is not None and not leg.on_rail:
         before = -up
     if after is None:

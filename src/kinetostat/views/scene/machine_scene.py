@@ -17,7 +17,7 @@ from kinetostat.kinetostatics.refusal import why_not
 from kinetostat.machine.machine import BASE_FRAME, Configuration, Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.views.scene import shapes
-from kinetostat.views.scene.anatomy import Anatomy, Proportions, anatomy, bounds, proportions_of, together
+from kinetostat.views.scene.anatomy import Anatomy, Proportions, anatomy, bounds, coincide, proportions_of
 from kinetostat.views.scene.leg_solids import joint_radius, leg_solids, rail_ends
 from kinetostat.views.scene.mesh import turn_of
 from kinetostat.views.scene.shapes import CORNER_POINTS, HALF_CIRCLE_POINTS
@@ -42,9 +42,15 @@ FLATNESS = 0.2
 LEAST_LEAN = 0.05
 """Sine of the angle between the links together and the plane of their joints, below which they lie in this plane."""
 PLATE_MARGIN = {"base": 3.6, "platform": 2.9}
-"""Width of the rim of a plate beyond its joints, in radii of a leg."""
+"""Width of the rim of a plate beyond its joints, in radii of a leg: their pedestals stand well inside."""
 PLATE_THICKNESS = {"base": 1.7, "platform": 1.3}
-"""Thickness of a plate, in radii of a leg."""
+"""Thickness of a plate, in radii of a leg: the base looks the heavier one."""
+LEAST_NECK = 4.0
+"""Distance of P from the middle of the platform's joints, in radii of a leg, beyond which a neck leads there."""
+LETTER_DISTANCE = 1.12
+"""Place of the letter of an axis of a frame, in lengths of the axis: just beyond its arrow."""
+NANOMETRE_DECIMALS = 9
+"""Decimals of a length in m to which corners of plates are rounded: round-off makes no two corners of one point."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +86,7 @@ class Plate:
     @property
     def lowest(self) -> float:
         """Height of the lowest point of the plate, about, base frame, m: below its middle or its lowest joint."""
-        thick = PLATE_THICKNESS["base"] * self.radius
+        thick = PLATE_THICKNESS["base"] * self.radius  # that of the thicker plate: the ground is below either
         middle = self.place.apply(Vector(0.0, 0.0, self.surface - thick))
         return min(middle.z, *(joint.z - thick for joint in self.joints))
 
@@ -89,7 +95,7 @@ class Plate:
         if self.block is not None:
             return [self._solid_block(self.block)]
         thick = PLATE_THICKNESS[self.name] * self.radius
-        outline = rounded_hull(self._flat(), PLATE_MARGIN[self.name] * self.radius)
+        outline = rounded_hull(self._joints_in_plane(), PLATE_MARGIN[self.name] * self.radius)
         origin = self.place.apply(Vector(0.0, 0.0, self.surface - thick))
         plate = Solid(
             f"{self.name}/plate",
@@ -104,9 +110,11 @@ class Plate:
         shape = shapes.block(size.x, size.y, size.z, 0.12 * min(size.components()))
         return Solid(f"{self.name}/block", shape, self.name, down)
 
-    def _flat(self) -> list[tuple[float, float]]:
-        axes, origin = self.place.rotation, self.place.translation
-        return [(_to_1_nm((j - origin).dot(axes.x)), _to_1_nm((j - origin).dot(axes.y))) for j in self.joints]
+    def _joints_in_plane(self) -> list[Point2]:
+        """Return the coordinates of the joints along x and y of the plate's frame, m."""
+        axes, places = self.place.rotation, [joint - self.place.translation for joint in self.joints]
+        decimals = NANOMETRE_DECIMALS
+        return [(round(place.dot(axes.x), decimals), round(place.dot(axes.y), decimals)) for place in places]
 
     def _pedestal(self, number: int, joint: Vector) -> Solid:
         height = (joint - self.place.translation).dot(self.normal) - self.surface
@@ -115,18 +123,13 @@ class Plate:
         return Solid(f"{self.name}/pedestal {number}", shape, "joint", upright(foot, self.normal))
 
 
-def _to_1_nm(number: float) -> float:
-    """Round a length (m) to 1 nm, so that round-off does not make two corners of coincident points."""
-    return round(number, 9)
-
-
 def plate_behind(
     name: str, joints: Sequence[Vector], links: Sequence[Vector], radius: float, frame: Displacement, side: Vector
 ) -> Plate:
-    """Place a plate behind joints, on the side away from their links.
+    """Place a plate behind joints, on the side away from their links, or a block around them; see `Plate.block`.
 
     Args:
-        name: base or platform.
+        name: base or platform; a block stands around joints that are apart in a platform only.
         joints: centres of the joints, base frame, m.
         links: vector from each joint into its leg, base axes.
         radius: radius of a leg, m.
@@ -135,22 +138,31 @@ def plate_behind(
     """
     points = np.array([joint.components() for joint in joints], dtype=float)
     centre = points.mean(axis=0)
-    spreads, axes = np.linalg.svd(points - centre)[1:]
+    spreads, axes = np.linalg.svd(points - centre)[1:]  # along three axes, the greatest first
+    is_hub = len(points) > 1 and float(spreads[0]) < HUB_SPREAD * radius
+    is_flat = len(points) < 4 or spreads[2] <= FLATNESS * spreads[0]
+    if name == "platform" and not (is_hub or is_flat):
+        return _block_around(name, joints, radius, frame)
     span_a_plane = len(points) > 2 and spreads[1] > HUB_SPREAD * radius
     normal = Vector(*axes[2].tolist()) if span_a_plane else frame.rotation.z
+    place = upright(Vector(*centre.tolist()), _towards_links(normal, links, side), frame.rotation.x)
+    return Plate(name, place, tuple(joints), radius, Vector(*[BLOCK_SIZE * radius] * 3) if is_hub else None)
+
+
+def _towards_links(normal: Vector, links: Sequence[Vector], side: Vector) -> Vector:
+    """Return the normal of a plate, or its opposite: the one that points to the links; arguments as `plate_behind`."""
     inward = unit(Vector(*np.sum([unit(link).components() for link in links], axis=0).tolist()))
     # Links in the plane of the joints do not say on which side the plate has room; then `side` decides.
     lean = inward.dot(normal) if abs(inward.dot(normal)) > LEAST_LEAN else side.dot(normal)
-    normal = normal if lean > 0.0 else -normal
-    place, block = upright(Vector(*centre.tolist()), normal, frame.rotation.x), None
-    if len(points) > 1 and float(spreads[0]) < HUB_SPREAD * radius:
-        block = Vector(*[BLOCK_SIZE * radius] * 3)
-    elif name == "platform" and len(points) > 3 and spreads[2] > FLATNESS * spreads[0]:
-        in_frame = np.array([frame.rotation.inverse().apply(joint).components() for joint in joints], dtype=float)
-        low, high = in_frame.min(axis=0), in_frame.max(axis=0)
-        place = Displacement(frame.rotation, frame.rotation.apply(Vector(*(0.5 * (low + high)).tolist())))
-        block = Vector(*(high - low + BLOCK_SIZE * radius).tolist())
-    return Plate(name, place, tuple(joints), radius, block)
+    return normal if lean > 0.0 else -normal
+
+
+def _block_around(name: str, joints: Sequence[Vector], radius: float, frame: Displacement) -> Plate:
+    """Return a block along the axes of a frame that holds all joints; arguments as for `plate_behind`."""
+    in_frame = np.array([frame.rotation.inverse().apply(joint).components() for joint in joints], dtype=float)
+    low, high = in_frame.min(axis=0), in_frame.max(axis=0)
+    place = Displacement(frame.rotation, frame.rotation.apply(Vector(*(0.5 * (low + high)).tolist())))
+    return Plate(name, place, tuple(joints), radius, Vector(*(high - low + BLOCK_SIZE * radius).tolist()))
 
 
 def scene_of(machine: Machine) -> Scene:
@@ -193,18 +205,22 @@ def machine_scene(machine: Machine, configuration: Configuration, sizes: Proport
     joints = [point for leg in configuration.legs for point in leg.path]
     tool = machine.tool_point(configuration.platform)
     low, high = bounds([*joints, configuration.platform.translation, tool, *rails])
-    beds = BED_DEPTH * max(joint_radius(leg, sizes) for leg in legs) if rails else 0.0
-    lowest = min(low.z - beds, *(plate.lowest for plate in (base, platform) if plate))
-    floor = lowest - FLOOR_CLEARANCE * sizes.leg
-    size = math.hypot(*(high - low).components())
-    return Scene(tuple(solids), tuple(labels), centre=(low + high) * 0.5, size=size, floor=floor)
+    bed_depth = BED_DEPTH * max(joint_radius(leg, sizes) for leg in legs) if rails else 0.0
+    lowest = min(low.z - bed_depth, *(plate.lowest for plate in (base, platform) if plate))
+    return Scene(
+        tuple(solids),
+        tuple(labels),
+        centre=(low + high) * 0.5,
+        size=math.hypot(*(high - low).components()),
+        floor=lowest - FLOOR_CLEARANCE * sizes.leg,
+    )
 
 
 def _frames(machine: Machine, configuration: Configuration) -> dict[str, Displacement]:
     """Return the frames of the base and the platform, and that of the tool if it is elsewhere, by their origins."""
     tool, platform = machine.tool_point(configuration.platform), configuration.platform
     frames = {"O": BASE_FRAME, "P": platform}
-    return frames if together(tool, platform.translation) else {**frames, "T": Displacement(platform.rotation, tool)}
+    return frames if coincide(tool, platform.translation) else {**frames, "T": Displacement(platform.rotation, tool)}
 
 
 def frame_solids(name: str, place: Displacement, length: float) -> list[Solid]:
@@ -223,7 +239,7 @@ def frame_labels(name: str, place: Displacement, length: float) -> list[Label]:
     """Write the name of a frame at its origin and the letters of its axes."""
     axes = place.rotation
     tips = zip("xyz", (axes.x, axes.y, axes.z), strict=True)
-    letters = [Label(letter, place.translation + axis * (1.12 * length), "frames") for letter, axis in tips]
+    letters = [Label(letter, place.translation + axis * (LETTER_DISTANCE * length), "frames") for letter, axis in tips]
     return [Label(name, place.translation, "frames"), *letters]
 
 
@@ -241,20 +257,19 @@ def plates(configuration: Configuration, legs: Sequence[Anatomy], radius: float)
         base_links = [leg.second_point - leg.foot for leg in feet]
         base = plate_behind("base", [leg.foot for leg in feet], base_links, radius, BASE_FRAME, up)
     platform_links = [leg.last_but_one - leg.head for leg in legs]
-    top = plate_behind("platform", [leg.head for leg in legs], platform_links, radius, configuration.platform, -up)
-    return base, top
+    heads = [leg.head for leg in legs]
+    return base, plate_behind("platform", heads, platform_links, radius, configuration.platform, -up)
 
 
 def tool_solids(machine: Machine, configuration: Configuration, platform: Plate, radius: float) -> list[Solid]:
     """Return the neck from the platform to P, and the tool from there to the tool point, where these lie apart."""
     tip, point = machine.tool_point(configuration.platform), configuration.platform.translation
     solids = []
-    near = (point - platform.place.translation).norm()
-    if near > 4.0 * radius and platform.block is None:
-        offset = point - platform.place.translation
+    offset = point - platform.place.translation
+    if offset.norm() > LEAST_NECK * radius and platform.block is None:
         shape = shapes.shaft(1.3 * radius, offset.norm(), 0.2 * radius)
         solids.append(Solid("platform/neck", shape, "platform", upright(platform.place.translation, offset)))
-    if not together(tip, point):
+    if not coincide(tip, point):
         shape = shapes.cone(1.5 * radius, 0.3 * radius, (tip - point).norm())
         solids.append(Solid("platform/tool", shape, "tool", upright(point, tip - point)))
     return solids
@@ -273,9 +288,9 @@ def rounded_hull(points: Sequence[Point2], margin: float) -> tuple[Point2, ...]:
         return tuple((hull[0][0] + margin * math.cos(a), hull[0][1] + margin * math.sin(a)) for a in angles)
     corners: list[Point2] = []
     for i, (x, y) in enumerate(hull):
-        (px, py), (nx, ny) = hull[i - 1], hull[(i + 1) % len(hull)]
-        first = math.atan2(y - py, x - px) - 0.5 * math.pi
-        turn = (math.atan2(ny - y, nx - x) - 0.5 * math.pi - first) % math.tau
+        (x_before, y_before), (x_after, y_after) = hull[i - 1], hull[(i + 1) % len(hull)]
+        first = math.atan2(y - y_before, x - x_before) - 0.5 * math.pi
+        turn = (math.atan2(y_after - y, x_after - x) - 0.5 * math.pi - first) % math.tau
         count = max(2, math.ceil(2 * CORNER_POINTS * turn / math.pi))
         angles = [first + turn * k / count for k in range(count + 1)]
         corners += [(x + margin * math.cos(a), y + margin * math.sin(a)) for a in angles]

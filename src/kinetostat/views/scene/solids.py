@@ -19,8 +19,12 @@ SCENE_DIGITS = 7
 """Significant digits of a number in a scene: a renderer has float32."""
 SHAPES_KEPT = 1024
 """Number of shapes whose data is kept: a machine has about a hundred, few of which change while it moves."""
-DECIMALS = 8
-"""Decimals of a place: 10 nm."""
+PLACE_DECIMALS = 8
+"""Decimals of a place (m) in a scene: 10 nm, which nobody sees."""
+LAYERS = ("machine", "springs", "load", "deflection", "ellipsoids", "directions", "frames", "labels")
+"""Layers that a viewer may show or hide."""
+BASE = Displacement(IDENTITY, ZERO)
+"""The place of a solid whose axes are those of the base frame."""
 
 
 @dataclass(frozen=True)
@@ -113,19 +117,11 @@ def looks_data() -> dict[str, dict[str, Any]]:
     return {name: asdict(look) for name, look in LOOKS.items()}
 
 
-def linear(color: str) -> tuple[float, float, float]:
+def linear_rgb(color: str) -> tuple[float, float, float]:
     """Convert "#rrggbb" to linear red, green and blue from 0 to 1 (IEC 61966-2-1)."""
-    parts = [int(color[i : i + 2], 16) / 255.0 for i in (1, 3, 5)]
+    parts = [int(color[start : start + 2], 16) / 255.0 for start in (1, 3, 5)]
     red, green, blue = (p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts)
     return red, green, blue
-
-
-LAYERS = ("machine", "springs", "load", "deflection", "ellipsoids", "directions", "frames", "labels")
-"""Layers that a viewer may show or hide."""
-
-
-BASE = Displacement(IDENTITY, ZERO)
-"""The place of a solid whose axes are those of the base frame."""
 
 
 @dataclass(frozen=True)
@@ -187,7 +183,7 @@ def as_data(scene: Scene) -> dict[str, Any]:
     return {
         "solids": [solid_data(solid) for solid in scene.solids],
         "labels": [label_data(label) for label in scene.labels],
-        "centre": [round(c, DECIMALS) for c in scene.centre.components()],
+        "centre": [round(c, PLACE_DECIMALS) for c in scene.centre.components()],
         "size": scene.size,
         "floor": scene.floor,
     }
@@ -201,11 +197,11 @@ def solid_data(solid: Solid) -> dict[str, Any]:
         "leg": solid.leg,
         "material": solid.material,
         "shape": _shape_data(solid.shape),
-        "place": [round(c, DECIMALS) for v in columns_of(solid) for c in v.components()],
+        "place": [round(c, PLACE_DECIMALS) for v in matrix_columns(solid) for c in v.components()],
     }
 
 
-def columns_of(solid: Solid) -> tuple[Vector, Vector, Vector, Vector]:
+def matrix_columns(solid: Solid) -> tuple[Vector, Vector, Vector, Vector]:
     """Return the columns of the 3 x 4 matrix from a solid's own axes, scaled, to the base frame (m)."""
     axes = solid.place.rotation
     x, y, z = (axis * size for axis, size in zip((axes.x, axes.y, axes.z), solid.scale, strict=True))
@@ -217,7 +213,7 @@ def label_data(label: Label) -> dict[str, Any]:
     return {
         "text": label.text,
         "layer": label.layer,
-        "point": [round(c, DECIMALS) for c in label.point.components()],
+        "point": [round(c, PLACE_DECIMALS) for c in label.point.components()],
     }
 
 
