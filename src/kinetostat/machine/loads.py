@@ -20,7 +20,7 @@ from kinetostat.machine.common_tables import Load
 from kinetostat.machine.leg import Turn
 from kinetostat.machine.links import LINK_TABLES, LinkKind, growth_of
 from kinetostat.machine.machine import Configuration, Family, Machine, Member, springs
-from kinetostat.machine.parameters import KEPT_FAMILIES
+from kinetostat.machine.parameters import KEPT_FAMILIES, LONGEST_NAME
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import quantities
@@ -121,8 +121,6 @@ def _members_of_kind(kind: LinkKind, machine: Machine, configuration: Configurat
 
 MOST_LOADS = 16
 """Named loads that a machine may have: far more than anybody writes by hand, so that more of them are a mistake."""
-LONGEST_LOAD_NAME = 40
-"""Characters that the name of a load may have: it stands in rows and paths of tables."""
 
 
 def family_with_loads(family: Family, document: Document, origin: str) -> Family:
@@ -138,10 +136,10 @@ def family_with_loads(family: Family, document: Document, origin: str) -> Family
     if len(names) > MOST_LOADS:
         raise InputError(f'"{origin}": [load] has {len(names)} named loads; at most {MOST_LOADS} are allowed.')
     for name in names:
-        if not name.isidentifier() or len(name) > LONGEST_LOAD_NAME:
+        if not name.isidentifier() or len(name) > LONGEST_NAME:
             raise InputError(
                 f'"{origin}": [load.{shorten(name)}] cannot be the name of a load; take letters, digits and _, at most '
-                f"{LONGEST_LOAD_NAME} of them, e.g. [load.counterweight]."
+                f"{LONGEST_NAME} of them, e.g. [load.counterweight]."
             )
     return _with_loads(family, names) if names else family
 

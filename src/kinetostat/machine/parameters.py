@@ -16,6 +16,8 @@ from kinetostat.spec.errors import InputError, nearest, shorten
 from kinetostat.spec.fields import Quantity, leaves, quantities
 from kinetostat.units import KINDS, RIGID, UnitError
 
+LONGEST_NAME = 40
+"""Characters of a name that people choose and that stands in paths: a row on the terminal has room for it."""
 KEPT_FAMILIES = 64
 """Families that caches keep, so that machines with one plan share parameters, tables and compiled programs."""
 FULL_TURN = 2.0 * math.pi * (1.0 + 1e-9)

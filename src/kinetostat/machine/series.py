@@ -14,7 +14,7 @@ from typing import Any
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.machine.leg import Element, Leg, PartName, Spring
 from kinetostat.machine.machine import Configuration, Family
-from kinetostat.machine.parameters import KEPT_FAMILIES
+from kinetostat.machine.parameters import KEPT_FAMILIES, LONGEST_NAME
 from kinetostat.spec.document import Document
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Field, made_table, optional, quantities
@@ -48,7 +48,7 @@ def parts(value: object, where: str) -> dict[str, object]:
     named: dict[str, object] = {}
     for name, stiffness in entries:
         key = re.sub(r"\W+", "_", name)
-        if not key.isidentifier() or keyword.iskeyword(key) or key.startswith("_") or len(key) > 40:
+        if not key.isidentifier() or keyword.iskeyword(key) or key.startswith("_") or len(key) > LONGEST_NAME:
             raise InputError(f'{where}: {shorten(name)} cannot name a part; write a short name, e.g. "ball screw".')
         if key in named:
             raise InputError(f'{where}: two parts are called "{label(key)}"; give each a name of its own.')

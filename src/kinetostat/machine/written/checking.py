@@ -20,12 +20,15 @@ from kinetostat.machine.written.ball_leg import ball_leg
 from kinetostat.machine.written.family import chains, place
 from kinetostat.machine.written.joints import JOINT_TYPES, departure
 from kinetostat.machine.written.parallel_axes import parallel_axes
-from kinetostat.machine.written.plan import BASE, PLATFORM, JointPlan, LegPlan, LinkPlan, Plan
-from kinetostat.spec.errors import InputError
-from kinetostat.tolerances import NO_AXIS, PARALLEL_AXES, PARALLEL_IN_FILE
+from kinetostat.machine.written.plan import BASE, PLATFORM, JointPlan, LegPlan, LinkPlan, Matrix, Plan
+from kinetostat.spec.errors import InputError, shorten
+from kinetostat.spec.fields import LARGEST_OTHER, LEAST_STIFFNESS
+from kinetostat.tolerances import NO_AXIS, PARALLEL_AXES, PARALLEL_IN_FILE, SYMMETRIC
 
 ELASTIC = ("lumped", "beam", "timoshenko")
 """Models of a link that need a cross-section, and so a length and a direction."""
+LARGEST_NUMBER = 1e100
+"""Size of numbers in a matrix or a direction from which they are a slip: below it, products of three stay finite."""
 RANDOM_AMOUNT = 0.4
 """Greatest random displacement of a joint, rad or m: large enough to leave a special home pose well behind."""
 
@@ -221,3 +224,42 @@ def _bodies(leg: Mapping[str, Any]) -> Iterable[object]:
     """The bodies of a leg as written, without base and platform."""
     lists = [part.get("joins") for part in leg.values() if isinstance(part, dict)]
     return [body for row in lists if isinstance(row, list) for body in row if body not in (BASE, PLATFORM)]
+
+
+def compliance_matrix(value: object, where: str) -> Matrix:
+    """A 6x6 from what was written: six numbers for its diagonal, or six rows; empty if an empty list was written.
+
+    Raises:
+        InputError: it is not a compliance: not symmetric, with a negative eigenvalue, or with entries that are slips.
+    """
+    if value == []:
+        return ()
+    if are_numbers(value, 6):
+        value = np.diag(np.array(value, dtype=float)).tolist()
+    if not isinstance(value, list) or len(value) != 6 or not all(are_numbers(row, 6) for row in value):
+        raise InputError(
+            f"{where}: compliance is {shorten(value)}; give six numbers (rx, ry, rz in rad/(N·m), x, y, z in m/N) or "
+            "six rows of six."
+        )
+    matrix = np.array(value, dtype=float)
+    least, most = 1.0 / LARGEST_OTHER, 1.0 / LEAST_STIFFNESS
+    out_of_bounds = [float(c) for c in np.diag(matrix) if c > 0.0 and not least <= c <= most]
+    if out_of_bounds:
+        raise InputError(
+            f"{where}: compliance has {out_of_bounds[0]:g} on its diagonal; give 0 where it is rigid, and elsewhere "
+            f"from {least:g} to {most:g} in SI units; what is free is a joint."
+        )
+    size = np.sqrt(np.abs(np.outer(np.diag(matrix), np.diag(matrix))))
+    scaled = matrix / np.where(size > 0.0, size, 1.0)
+    if np.abs(scaled - scaled.T).max() > SYMMETRIC or np.linalg.eigvalsh(scaled)[0] < -SYMMETRIC:
+        raise InputError(f"{where}: compliance must be symmetric and have no negative eigenvalue (no negative energy).")
+    return tuple(tuple(row) for row in matrix.tolist())
+
+
+def are_numbers(value: object, count: int) -> bool:
+    """Whether a value is a list of so many numbers, none of which is a slip."""
+    return (
+        isinstance(value, list)
+        and len(value) == count
+        and all(isinstance(c, int | float) and not isinstance(c, bool) and abs(c) < LARGEST_NUMBER for c in value)
+    )

@@ -260,37 +260,42 @@ ONE_FREEDOM = tuple(name for name, kind in JOINT_TYPES.items() if kind.stiffness
 
 
 AXIS_FIELDS = ("axis", "first_axis", "second_axis")
+"""Fields of a joint that are directions; each may be the name of a joint of the leg, towards which it then points."""
 
 
-def write_directions(joints: Mapping[str, dict[str, Any]], where: str) -> None:
-    """Put numbers in the place of names of joints, and both axes in the place of a universal joint's shaft.
+def with_directions(joints: Mapping[str, dict[str, Any]], where: str) -> dict[str, dict[str, Any]]:
+    """The joints with numbers in the place of names of joints, and both axes in that of a universal joint's shaft.
 
     Args:
-        joints: the joints of a leg by name, as written; they are changed.
+        joints: the joints of a leg by name, as written.
         where: names the leg in messages.
 
     Raises:
         InputError: no such joint in the leg.
     """
-    for name, joint in joints.items():
+    result = {}
+    for name, written in joints.items():
+        joint = dict(written)
         for key in AXIS_FIELDS:
             if isinstance(joint.get(key), str):
                 other = choice(joint[key], joints, f'{where}, joint "{name}": {key}, which may name a joint,')
                 joint[key] = _direction_to(joint, joints[other], joint[key])
         if joint.get("type") == "universal" and "axis" in joint and not {"first_axis", "second_axis"} & joint.keys():
-            joint |= _cross_of(joint.pop("axis"))
+            joint |= _axes_across(joint.pop("axis"))
+        result[name] = joint
+    return result
 
 
-def _direction_to(joint: Mapping[str, Any], other: Mapping[str, Any], given: str) -> list[float] | str:
-    """From the point of one joint to that of another; as it was given if they are not points, which `spec` refuses."""
+def _direction_to(joint: Mapping[str, Any], other: Mapping[str, Any], as_written: str) -> list[float] | str:
+    """From the point of one joint to that of another; the text itself if they are not points, which `spec` refuses."""
     try:
         ends = [[parse(entry, "length") for entry in each.get("point", ())] for each in (joint, other)]
         return [far - near for near, far in zip(*ends, strict=True)]
     except (UnitError, TypeError, ValueError):
-        return given
+        return as_written
 
 
-def _cross_of(axis: object) -> dict[str, Any]:
+def _axes_across(axis: object) -> dict[str, Any]:
     """Axes of a universal joint square to its shaft: the first one level, unless the shaft is upright."""
     try:
         shaft = Vector(*(parse(entry, "direction") for entry in axis))  # type: ignore[attr-defined]

@@ -290,12 +290,12 @@ def _without_round_off(number: float) -> float:
 
 
 def copies_in(leg: dict[str, Any], where: str) -> Copies | None:
-    """Take out of a leg its fields about copies; None if it has none.
+    """Read the fields of a leg about copies, `COPY_KEYS`; None if it has none.
 
     Raises:
         InputError: no number of copies, or one that does not go with the angles; names the leg.
     """
-    count, angles, mirrored = leg.pop("copies", None), leg.pop("angles", []), leg.pop("mirrored", False)
+    count, angles, mirrored = leg.get("copies"), leg.get("angles", []), leg.get("mirrored", False)
     if count is None and angles == [] and mirrored is False:
         return None
     if not isinstance(mirrored, bool):
