@@ -186,7 +186,7 @@ def test_the_chord_method_leads_so_near_that_a_step_of_newton_is_repeated_at_few
 def test_programs_with_more_results_than_are_kept_together_evaluate_point_by_point(monkeypatch):
     from kinetostat.engine import rest
 
-    monkeypatch.setattr(rest, "NUMBERS_TOGETHER", 1)
+    monkeypatch.setattr(rest, "NUMBERS_PER_STEP", 1)
     machine = moved_by_about("planar-3rrr", 1e-3)
     assert (compare(machine, poses_near(machine, 3), quantities_of(machine)) == Status.OK).all()
 

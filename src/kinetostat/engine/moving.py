@@ -10,6 +10,7 @@ from dataclasses import field
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, where
+from kinetostat.algebra.symmetric import SIZE
 from kinetostat.arrays import Array, Codes, Integers
 from kinetostat.engine.form import (
     Form,
@@ -25,24 +26,27 @@ from kinetostat.engine.form import (
 from kinetostat.engine.kernel import closes_inside, program_columns, program_of, recipe_of
 from kinetostat.equilibrium.state import MachineState, states_at
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closing import within_reach
+from kinetostat.kinematics.closing import Joints, within_reach
 from kinetostat.kinematics.status import Status
 from kinetostat.machine.column import column, stacked_columns
-from kinetostat.machine.machine import Machine
+from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import POSE
 from kinetostat.motion.machine_at_pose import (
     NUMBERS_OF_DRIVE,
     MachineAtPose,
     at_pose,
     drive_numbers,
+    joint_numbers,
     joints_of,
-    motion_details,
+    reflected_inertia,
+    tool_wrench,
 )
 from kinetostat.motion.rates import PoseRates
 from kinetostat.motion.rigid import MotionPlan, masses_of_links, plan_of
 
 COMPILED_FROM = 2000
-"""Points from which machine code pays, which takes a second or two to compile and is then kept on disk."""
+"""Points from which machine code pays. Columns take 0.1 s for so many and compiling takes 0.2 s or more, but only once
+for a form of machines: the code is kept on disk, and few motions of so many points are asked for only once."""
 
 
 @dataclass(frozen=True)
@@ -76,8 +80,11 @@ class PosePath:
 
     def at(self, rows: Integers) -> "PosePath":
         """Return some of its points, by number."""
-        parts = (self.pose, self.rates, self.accelerations, self.loads)
-        return PosePath(*({name: np.asarray(column)[rows] for name, column in part.items()} for part in parts))
+        pose, rates, accelerations, loads = (
+            {name: np.asarray(values)[rows] for name, values in part.items()}
+            for part in (self.pose, self.rates, self.accelerations, self.loads)
+        )
+        return PosePath(pose, rates, accelerations, loads)
 
 
 @dataclass(frozen=True)
@@ -86,9 +93,10 @@ class PathForces:
 
     Attributes:
         drives: numbers of each drive, see `machine_at_pose.NUMBERS_OF_DRIVE` [drives x numbers x n], SI.
-        wrench: wrench of the tool, see `machine_at_pose.tool_wrench` [6 x n], N·m and N; none if nobody asked.
-        joints: force (N) and moment (N·m) of each joint [joints x 2 x n]; none if nobody asked.
-        inertia: reflected, of each drive [drives x n]; none if nobody asked, or of more drives than coordinates.
+        joints: force (N) and moment (N·m) of each joint [joints x 2 x n]; none if they are not asked for.
+        wrench: wrench of the tool, see `machine_at_pose.tool_wrench` [6 x n], N·m and N; none without joints.
+        inertia: reflected inertia of each drive [drives x n], kg or kg·m²; none without joints, or if there are more
+            drives than coordinates.
         status: `Status` codes [n].
     """
 
@@ -97,6 +105,47 @@ class PathForces:
     wrench: Array
     inertia: Array
     status: Codes
+
+    @classmethod
+    def of_rows(cls, rows: Array, status: Codes, drive_count: int, joint_count: int) -> "PathForces":
+        """Take apart what `numbers_along` gives, a row for each number [numbers x n].
+
+        Args:
+            rows: the numbers.
+            status: `Status` codes [n].
+            drive_count: number of drives.
+            joint_count: number of joints with a load; 0 where the numbers are those of drives alone.
+        """
+        ends = np.cumsum([drive_count * len(NUMBERS_OF_DRIVE), 2 * joint_count, SIZE])
+        drives, joints, wrench, inertia = np.split(rows, ends)
+        return cls(
+            drives=drives.reshape(drive_count, len(NUMBERS_OF_DRIVE), len(status)),
+            joints=joints.reshape(joint_count, 2, len(status)),
+            wrench=wrench,
+            inertia=inertia,
+            status=status,
+        )
+
+
+def numbers_along(placed: MachineAtPose, direction: PoseRates, joints_too: bool) -> list[Scalar]:
+    """Return the numbers of a machine along a motion, in the order that `PathForces.of_rows` takes apart.
+
+    Args:
+        placed: the machine at its pose.
+        direction: the motion.
+        joints_too: whether loads of joints, the wrench of the tool and reflected inertia follow those of the drives.
+    """
+    numbers = drive_numbers(placed, direction)
+    if joints_too:
+        numbers += joint_numbers(placed, direction, joints_of(placed.configuration))
+        numbers += [*tool_wrench(placed, direction), *reflected_inertia(placed)]
+    return numbers
+
+
+def _status_of(configuration: Configuration, joints: Joints | None) -> Scalar:
+    """Return the `Status` code of a pose at which a machine only has to be placed: its joints close, its legs reach."""
+    status: Scalar = int(Status.OK) if joints is None else joints.status
+    return where(within_reach(configuration), status, int(Status.OUT_OF_REACH))
 
 
 def motion_of(
@@ -112,7 +161,7 @@ def motion_of(
         form: how its parameters enter; its pose varies, and loads may.
         plan: which motions there are.
         links: how many links have a mass that does not follow the pose; 0 for masses as they are at each pose.
-        joints_too: whether loads of joints and reflected inertia come after the numbers of the drives.
+        joints_too: see `numbers_along`.
         closed: whether joints are closed inside the program.
     """
     traced = traced_machine(kind, form)
@@ -120,19 +169,13 @@ def motion_of(
     configuration = traced.machine.configure(joints.coordinates if joints else ())
     names = [path.removeprefix(POSE) for path in form.varying if path.startswith(POSE)]
     size = len(names)
-    moving = new_inputs(traced.graph, 2 * size + links)
-    direction = PoseRates(
-        dict(zip(names, moving[:size], strict=True)), dict(zip(names, moving[size : 2 * size], strict=True))
-    )
-    parts = at_pose(traced.machine, configuration, joints, plan, moving[2 * size :] or None)
-    results = drive_numbers(parts, direction)
-    if joints_too:
-        results += motion_details(parts, direction)
-    status: Scalar = joints.status if joints else int(Status.OK)
-    status = where(within_reach(configuration), status, int(Status.OUT_OF_REACH))
-    accepted = status < Status.OK + 0.5
-    accepted_results = [result_of(where(accepted, value, math.nan)) for value in results]
-    return formula_of(traced, columns, accepted_results, result_of(status), coordinates=moving)
+    rates, accelerations, masses = (new_inputs(traced.graph, count) for count in (size, size, links))
+    direction = PoseRates(dict(zip(names, rates, strict=True)), dict(zip(names, accelerations, strict=True)))
+    placed = at_pose(traced.machine, configuration, joints, plan, masses or None)
+    numbers, status = numbers_along(placed, direction, joints_too), _status_of(configuration, joints)
+    accepted = status < Status.OK + 0.5  # codes are traced as floats
+    results = [result_of(where(accepted, number, math.nan)) for number in numbers]
+    return formula_of(traced, columns, results, result_of(status), coordinates=(*rates, *accelerations, *masses))
 
 
 @dataclass(frozen=True)
@@ -142,7 +185,8 @@ class RigidForm:
     Attributes:
         machine: the machine at the pose at which its telescopic legs have their mass.
         plan: which motions there are.
-        masses: masses of its links, kg; none of a machine written leg by leg, whose file says them.
+        masses: masses of its links, kg; empty for those at each pose, which a machine written leg by leg has in its
+            file, and a machine without such masses need not be given.
     """
 
     machine: Machine
@@ -157,8 +201,8 @@ class RigidForm:
 def rigid_form(state: MachineState) -> RigidForm:
     """Decide what the equations of a machine look like, at its pose."""
     plan = plan_of(state.machine, state.configuration, state.joints)
-    closed = state.machine.family.chains is None
-    masses = tuple(map(float, masses_of_links(state.machine, state.configuration))) if closed else ()
+    in_closed_form = state.machine.family.chains is None
+    masses = tuple(map(float, masses_of_links(state.machine, state.configuration))) if in_closed_form else ()
     return RigidForm(state.machine, plan, masses if any(masses) else ())
 
 
@@ -172,62 +216,50 @@ def forces_on_path(form: RigidForm, path: PosePath, joints: bool = False, compil
         compiled: whether by machine code; if None, where there are many points.
     """
     state = MachineState(form.machine)
-    size, loaded = len(form.at(state).rigid.drives), joints_of(state.configuration) if joints else []
-    if compiled if compiled is not None else path.size >= COMPILED_FROM:
-        results, status = _by_program(form, path, joints)
-    else:
-        results, status = _by_columns(form, path, joints)
-    end = size * len(NUMBERS_OF_DRIVE)
-    pairs = end + 2 * len(loaded)
-    return PathForces(
-        results[:end].reshape(size, len(NUMBERS_OF_DRIVE), path.size),
-        results[end:pairs].reshape(len(loaded), 2, path.size),
-        results[pairs : pairs + 6],
-        results[pairs + 6 :],
-        status,
-    )
+    drive_count, joint_count = len(form.at(state).rigid.drives), len(joints_of(state.configuration)) if joints else 0
+    by_program = path.size >= COMPILED_FROM if compiled is None else compiled
+    rows, status = (_rows_by_program if by_program else _rows_by_columns)(form, path, joints)
+    return PathForces.of_rows(rows, status, drive_count, joint_count)
 
 
-def _by_columns(form: RigidForm, path: PosePath, joints: bool) -> tuple[Array, Codes]:
+def _rows_by_columns(form: RigidForm, path: PosePath, joints_too: bool) -> tuple[Array, Codes]:
+    """Compute the numbers of a motion [numbers x n] and its status codes by NumPy, all points at once."""
     with np.errstate(all="ignore"):
         state = states_at(form.machine, path.columns, path.size)
-        parts = form.at(state)
         rates, accelerations = (
             {name: column(np.asarray(values, dtype=float)) for name, values in part.items()}
             for part in (path.rates, path.accelerations)
         )
-        direction = PoseRates(rates, accelerations)
-        numbers = drive_numbers(parts, direction)
-        if joints:
-            numbers += motion_details(parts, direction)
-        placed: Scalar = int(Status.OK) if state.joints is None else state.joints.status
-        status = np.where(np.asarray(within_reach(state.configuration)), placed, int(Status.OUT_OF_REACH))
-        results = stacked_columns(numbers, path.size).T.copy()
+        numbers = numbers_along(form.at(state), PoseRates(rates, accelerations), joints_too)
+        status = np.asarray(_status_of(state.configuration, state.joints))
+        rows = stacked_columns(numbers, path.size).T.copy()
     codes = np.broadcast_to(status, (path.size,)).astype(np.int8)
-    results[:, codes != Status.OK] = np.nan
-    return results, codes
+    rows[:, codes != Status.OK] = np.nan
+    return rows, codes
 
 
-def _by_program(form: RigidForm, path: PosePath, joints: bool) -> tuple[Array, Codes]:
-    """By machine code, which closes the legs itself where they have closed forms; the rest is closed before it."""
+def _rows_by_program(form: RigidForm, path: PosePath, joints_too: bool) -> tuple[Array, Codes]:
+    """Compute the same by machine code; points at which it finds no joints in closed form are closed before it."""
     closed = closes_inside(form.machine)
-    results, status = _run(form, path, joints, closed)
+    rows, status = _run_program(form, path, joints_too, closed)
     unsolved = np.flatnonzero(status == Status.NOT_CONVERGED)
     if closed and unsolved.size:
-        results[:, unsolved], status[unsolved] = _run(form, path.at(unsolved), joints, closed=False)
-    return results, status
+        rows[:, unsolved], status[unsolved] = _run_program(form, path.at(unsolved), joints_too, closed=False)
+    return rows, status
 
 
-def _run(form: RigidForm, path: PosePath, joints: bool, closed: bool) -> tuple[Array, Codes]:
+def _run_program(form: RigidForm, path: PosePath, joints_too: bool, closed: bool) -> tuple[Array, Codes]:
+    """Run the program of `motion_of`, whose columns of rates, accelerations and masses follow those of the pose."""
     machine, varying = form.machine, path.columns
     shape, fixed = form_of(machine, list(varying))
-    options = {"plan": form.plan, "links": len(form.masses), "joints_too": joints, "closed": closed}
-    program = program_of(recipe_of(motion_of, Specimen(machine), shape, **options))
+    links, kind = len(form.masses), Specimen(machine)
+    recipe = recipe_of(motion_of, kind, shape, plan=form.plan, links=links, joints_too=joints_too, closed=closed)
+    program = program_of(recipe)
     program_inputs = program_columns(machine, shape, varying, path.size, closed)
     program_inputs += [
         np.ascontiguousarray(part[name], dtype=float) for part in (path.rates, path.accelerations) for name in path.pose
     ]
     program_inputs += [np.full(path.size, mass) for mass in form.masses]
-    results, status = np.empty((program.rows, path.size)), np.empty(path.size, dtype=np.int8)
-    program.run(fixed, program_inputs, results, status)
-    return results, status
+    rows, status = np.empty((program.rows, path.size)), np.empty(path.size, dtype=np.int8)
+    program.run(fixed, program_inputs, rows, status)
+    return rows, status

@@ -29,6 +29,7 @@ from kinetostat.engine.form import (
 from kinetostat.engine.kernel import program_columns, program_of, recipe_of
 from kinetostat.engine.trace import Runnable
 from kinetostat.equilibrium.reduced import reduced_machine
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.written.family import at_home
@@ -36,13 +37,14 @@ from kinetostat.numerics.iteration import SHRINKING
 from kinetostat.tolerances import LAST_STEP, ONE_STEP_AWAY
 
 MOST_NEWTON_STEPS = 8
-"""Most steps of Newton's method per point after the program of the first step, whatever other points need."""
+"""Most steps of Newton's method per point, whatever other points need: they converge quadratically, so that three or
+four do, and a point that needs more than eight is one for the solver for any machine."""
 MOST_CHORD_STEPS = 6
 """Most steps of the chord method per point: each leaves less than a tenth (`SHRINKING`) of the one before it, so that
 six lead from 1e-6 to `LAST_STEP`. Newton's method goes on where that was not enough."""
-NUMBERS_TOGETHER = 2**17
-"""Numbers that a step gives for points that are evaluated together: they stay in the second cache level until the next
-step takes them, and there are enough points for the call of a program to cost nothing beside them."""
+NUMBERS_PER_STEP = 2**17
+"""Most numbers in the result of one step. Points are evaluated in groups of this size: a megabyte of numbers stays in
+the second cache level until the next step reads it, and the cost of calling a program is small beside a group."""
 
 
 RestStep = Literal["first", "newton", "chord"]
@@ -76,20 +78,58 @@ def step_of(kind: Specimen, form: Form, closed: bool, step: RestStep = "newton")
     return formula_of(traced, columns, results, 0.0, coordinates=coordinates)
 
 
-class StepMemory:
-    """Memory for two steps of some points, which change places after each step: a program cannot write what it reads.
+@dataclass(frozen=True)
+class StepResults:
+    """The results of a step at some points, as programs write them.
 
     Attributes:
-        last: results of the last step [rows x points].
-        next: room for those of the next one [rows x points].
+        rows: the quantities, coordinates of the states after the step, and squares of its sizes [rows x points].
+        count: number of the quantities; 0 of programs that only take steps.
     """
 
-    def __init__(self, rows: int, points: int) -> None:
-        self.last, self.next = np.empty((rows, points)), np.empty((rows, points))
+    rows: Array
+    count: int = 0
+
+    @property
+    def quantities(self) -> Array:
+        """The quantities [count x points]."""
+        return self.rows[: self.count]
+
+    @property
+    def step(self) -> Array:
+        """The part that a program of steps alone writes: coordinates and squares [coordinates + 1 x points]."""
+        return self.rows[self.count :]
+
+    @property
+    def states(self) -> Array:
+        """The coordinates of the states after the step [coordinates x points]."""
+        return self.rows[self.count : -1]
+
+    @property
+    def squares(self) -> Array:
+        """The squares of the sizes of the step [points]."""
+        return self.rows[-1]
+
+    def first(self, points: int) -> "StepResults":
+        """Those of the first points."""
+        return StepResults(self.rows[:, :points], self.count)
+
+
+class StepMemory:
+    """Memory for two steps of some points: a program cannot write what it reads.
+
+    Attributes:
+        read: results of the last step, from which the next one starts.
+        written: room for the results of the next step.
+    """
+
+    def __init__(self, rows: int, count: int, points: int) -> None:
+        """Take memory for so many rows, of which `count` are quantities."""
+        self.read, self.written = (StepResults(np.empty((rows, points)), count) for _ in range(2))
 
     def swap(self) -> None:
-        """Take what was the next step for the last one."""
-        self.last, self.next = self.next, self.last
+        """Let the next step read what was written."""
+        self.read, self.written = self.written, self.read
 
 
 class RestFill:
@@ -125,8 +165,7 @@ class LegwiseRestFill:
     """The fill of quantities at rest of machines whose legs close loops.
 
     A step of Newton's method takes as long as the quantities, so that one program does both. Steps of the chord method,
-    each a quarter of it, lead so near to the state that this program has to be repeated at few points. It gives the
-    quantities, then the coordinates of the states, and in its last row the squares of the sizes of its steps.
+    each a quarter of it, lead so near to the state that this program has to be repeated at few points.
 
     Attributes:
         form: how parameters enter the programs.
@@ -140,8 +179,8 @@ class LegwiseRestFill:
         self.form, self.fixed = form_of(machine, paths)
         step = partial(recipe_of, step_of, Specimen(at_home(machine, paths)), self.form, closed=closed)
         self._first, self._chord = program_of(step(step="first")), program_of(step(step="chord"))
-        self._step = _program_at_rest(machine, self.form, quantities, closed, stepping=True)
-        self.size = self._step.rows - self._count - 1
+        self._program = _program_at_rest(machine, self.form, quantities, closed, stepping=True)
+        self.size = self._program.rows - self._count - 1  # the last row is the square of the step's size
 
     def __call__(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Evaluate a slab, see `Fill`."""
@@ -156,10 +195,10 @@ class LegwiseRestFill:
             states: array for the coordinates of the states of rest [size x points], if they are wanted.
         """
         count = len(status)
-        together = max(1, min(count, NUMBERS_TOGETHER // self._step.rows))
-        memory = StepMemory(self._step.rows, together)
-        for start in range(0, count, together):
-            part = slice(start, start + together)
+        group = max(1, min(count, NUMBERS_PER_STEP // self._program.rows))
+        memory = StepMemory(self._program.rows, self._count, group)
+        for start in range(0, count, group):
+            part = slice(start, start + group)
             some_states = None if states is None else states[:, part]
             self._fill([column[part] for column in program_inputs], results[:, part], status[part], some_states, memory)
 
@@ -168,23 +207,23 @@ class LegwiseRestFill:
     ) -> None:
         """Evaluate some points, see `solve`."""
         count = len(status)
-        self._first.run(self.fixed, program_inputs, memory.last[self._count :, :count], np.empty(count, dtype=np.int8))
+        self._first.run(self.fixed, program_inputs, memory.read.first(count).step, np.empty(count, dtype=np.int8))
         self._approach(program_inputs, memory, count)
-        starts, points = memory.last[self._count :, :count], np.arange(count)
+        coordinates, points = memory.read.first(count).states, np.arange(count)
         for _ in range(MOST_NEWTON_STEPS):
-            stepped, codes = memory.next[:, : len(points)], np.empty(len(points), dtype=np.int8)
-            self._step.run(self.fixed, [*program_inputs, starts[:-1]], stepped, codes)
+            stepped, codes = memory.written.first(len(points)), np.empty(len(points), dtype=np.int8)
+            self._program.run(self.fixed, [*program_inputs, coordinates], stepped.rows, codes)
             places = slice(None) if len(points) == count else points  # a slice is copied much faster
-            results[:, places], status[places] = stepped[: self._count], codes
+            results[:, places], status[places] = stepped.quantities, codes
             if states is not None:
-                states[:, places] = stepped[self._count : -1]
-            moving = stepped[-1] > LAST_STEP**2
+                states[:, places] = stepped.states
+            moving = stepped.squares > LAST_STEP**2
             if not moving.any():
                 break
-            starts = stepped[self._count :]
+            coordinates = stepped.states
             if not moving.all():
                 points, program_inputs = points[moving], [column[moving] for column in program_inputs]
-                starts = starts.compress(moving, axis=1)
+                coordinates = coordinates.compress(moving, axis=1)
             memory.swap()
 
     def _approach(self, program_inputs: list[Array], memory: StepMemory, count: int) -> None:
@@ -192,18 +231,18 @@ class LegwiseRestFill:
 
         Args:
             program_inputs: columns of the programs before those of the states.
-            memory: its last step has the states, before and after.
+            memory: the states are read from it, and their last ones are what it reads afterwards.
             count: number of points.
         """
         points = np.arange(count)
         for _ in range(MOST_CHORD_STEPS):
-            states = memory.last[self._count :, :count]
+            before = memory.read.first(count)
             is_all = len(points) == count
-            starts = states if is_all else states.take(points, axis=1)
+            last = before if is_all else StepResults(before.step.take(points, axis=1))
             columns = program_inputs if is_all else [column[points] for column in program_inputs]
-            stepped, codes = memory.next[self._count :, : len(points)], np.empty(len(points), dtype=np.int8)
-            self._chord.run(self.fixed, [*columns, starts[:-1]], stepped, codes)
-            square_before, square = starts[-1], stepped[-1]
+            stepped, codes = memory.written.first(len(points)), np.empty(len(points), dtype=np.int8)
+            self._chord.run(self.fixed, [*columns, last.states], stepped.step, codes)
+            square_before, square = last.squares, stepped.squares
             shrinking = square < SHRINKING**2 * square_before
             # The next step will be shorter by the same ratio: size * (size / size before).
             unfinished = shrinking & (square * square > LAST_STEP**2 * square_before)
@@ -211,7 +250,7 @@ class LegwiseRestFill:
             if is_all and not stalled.any():
                 memory.swap()
             else:
-                states[:, points[shrinking]] = stepped.compress(shrinking, axis=1)
+                before.step[:, points[shrinking]] = stepped.step.compress(shrinking, axis=1)
             points = points[unfinished]
             if not len(points):
                 break
@@ -232,10 +271,9 @@ class StatePrograms:
         self._kind = Specimen(at_home(machine, form.varying) if native else machine)
         self._form, self._closed, self._native = form, closed, native
         self._making = Lock()
-        self._first = self._step("first")
-        self._size = self._first.rows - 1  # the last result is the square of the size of the step
+        self._first = self._program_of("first")
 
-    def _step(self, step: RestStep) -> Runnable:
+    def _program_of(self, step: RestStep) -> Runnable:
         with self._making:  # threads that need a program at the same time wait until it is there
             recipe = recipe_of(step_of, self._kind, self._form, closed=self._closed, step=step)
             return program_of(recipe, self._native)
@@ -243,29 +281,30 @@ class StatePrograms:
     def rest_coordinates(self, fixed: Array, program_inputs: Sequence[Array], count: int) -> list[Array]:
         """Find the states of rest: a row of points for each coordinate.
 
-        A point without one nearby has NaN, or the coordinates of the last step where its steps do not settle.
+        Where steps do not settle, coordinates mean nothing, or are NaN: the program of the quantities judges them. The
+        codes of the steps themselves say nothing and are dropped.
 
         Args:
             fixed: values of the parameters that are the same at all points.
             program_inputs: columns of the others, and of joints if they are not closed inside the programs.
             count: number of points.
         """
-        result, codes = np.empty((self._size + 1, count)), np.empty(count, dtype=np.int8)
-        self._first.run(fixed, program_inputs, result, codes)
+        reached, codes = StepResults(np.empty((self._first.rows, count))), np.empty(count, dtype=np.int8)
+        self._first.run(fixed, program_inputs, reached.rows, codes)
         for _ in range(MOST_NEWTON_STEPS):
-            moving = result[-1] > ONE_STEP_AWAY**2
+            moving = reached.squares > ONE_STEP_AWAY**2
             points = np.flatnonzero(moving)
             if not len(points):
                 break
-            step, columns = self._step("newton"), [*program_inputs, *result[:-1]]
+            columns = [*program_inputs, *reached.states]
             # Picking out more than half of the points would take longer than computing the others as well.
             computes_all = 2 * len(points) > count
             if not computes_all:
                 columns = [column[points] for column in columns]
-            stepped = np.empty((self._size + 1, len(columns[0])))
-            step.run(fixed, columns, stepped, codes[: len(columns[0])])
+            stepped = np.empty((self._first.rows, len(columns[0])))
+            self._program_of("newton").run(fixed, columns, stepped, codes[: len(columns[0])])
             if computes_all:
-                np.copyto(result, stepped, where=moving)
+                np.copyto(reached.rows, stepped, where=moving)
             else:
-                result[:, points] = stepped
-        return [*result[:-1]]
+                reached.rows[:, points] = stepped
+        return [*reached.states]

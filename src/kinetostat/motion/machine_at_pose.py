@@ -1,7 +1,7 @@
 """A machine of rigid parts at a pose: how it moves, its equations of motion, and the numbers of its drives and joints.
 
 Everything that follows from a pose and a motion over scalars starts here: `at_pose` places a machine, `along` moves it.
-Numbers for compiled programs are flat lists of scalars, which `engine.moving` takes apart again.
+Numbers of drives, joints and the tool are flat lists of scalars, of which `engine.moving` makes programs.
 
 Source: theory (90)-(95). SI, unless said otherwise.
 """
@@ -314,7 +314,7 @@ def _joints_of_leg(number: int, chain: tuple[object, ...]) -> Iterator[LoadedJoi
 
 
 def joint_numbers(placed: MachineAtPose, direction: PoseRates, joints: list[LoadedJoint]) -> list[Scalar]:
-    """Return the size of the force (N), and of the moment about its point (N·m), of each joint, theory (93).
+    """Return of each joint the size of its force (N), then that of its moment about its point (N·m), theory (93).
 
     The moment of a slide, which has no point, is 0.0.
     """
@@ -374,9 +374,3 @@ def tool_wrench(placed: MachineAtPose, direction: PoseRates) -> list[Scalar]:
             whole = [a - b * force for a, b in zip(whole, solved, strict=True)]
     length = placed.rigid.length
     return [*(part * length for part in whole[:3]), *whole[3:]]
-
-
-def motion_details(placed: MachineAtPose, direction: PoseRates) -> list[Scalar]:
-    """Return the loads of all joints, two numbers each, the wrench at the tool, and the reflected inertia of drives."""
-    loads = joint_numbers(placed, direction, joints_of(placed.configuration))
-    return [*loads, *tool_wrench(placed, direction), *reflected_inertia(placed)]
