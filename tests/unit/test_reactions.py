@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from kinetostat.algebra.screw import Wrench
+from kinetostat.algebra.screw import NO_WRENCH, Wrench
 from kinetostat.algebra.vector import AXES, IDENTITY, X_AXIS, Y_AXIS, Z_AXIS, ZERO, Displacement, Vector
 from kinetostat.kinetostatics.loading import (
     deflection,
@@ -13,7 +13,6 @@ from kinetostat.kinetostatics.loading import (
     joint_reactions,
     leg_wrenches,
     spring_loads,
-    sum_of,
 )
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.leg import Joint, Leg, Spring, revolutes
@@ -125,7 +124,7 @@ def test_parallel_springs_share_by_stiffness(stiffness):
     assert shares == pytest.approx([-100.0 * share for share in ends], rel=1e-9, abs=1e-9)
     carried = leg_wrenches(response, down)
     assert [wrench.translational.z for wrench in carried[: len(stiffness)]] == pytest.approx(shares, abs=1e-9)
-    assert screw(sum_of(carried)) == pytest.approx(screw(down), abs=1e-9)
+    assert screw(sum(carried, NO_WRENCH)) == pytest.approx(screw(down), abs=1e-9)
     assert deflection(response.statics, down).translational.z == pytest.approx(-100.0 / sum(stiffness), rel=1e-9)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from kinetostat.algebra.screw import Twist, Wrench
 from kinetostat.algebra.vector import ZERO, Vector
-from kinetostat.kinetostatics.indices import Principal
+from kinetostat.kinetostatics.indices import PrincipalCompliances
 from kinetostat.kinetostatics.loading import deflected_links, deflection
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import changed, load
@@ -160,7 +160,9 @@ def test_ellipsoids_have_the_axes_of_the_compliances():
     configuration = respond(machine).configuration
     sizes = proportions_of(machine, configuration)
     axes = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
-    found = compliance_overlays(machine, configuration, sizes, {"translation": Principal([1e-9, 2e-9, 4e-9], axes)})
+    found = compliance_overlays(
+        machine, configuration, sizes, {"translation": PrincipalCompliances([1e-9, 2e-9, 4e-9], axes)}
+    )
     (body,) = [s for s in found if s.name == "ellipsoid of translation"]
     assert body.scale[0] / body.scale[2] == pytest.approx(0.25)
     assert body.scale[1] / body.scale[2] == pytest.approx(0.5)

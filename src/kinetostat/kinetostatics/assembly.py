@@ -7,6 +7,7 @@ Source: theory (4)-(6) and (8)-(11). All screws, K and C are at one reference po
 """
 
 from collections.abc import Sequence
+from itertools import islice
 
 from kinetostat.algebra.scalar import Scalar, is_infinite, larger, reciprocal, total, where
 from kinetostat.algebra.screw import NO_MOTION, Screw, Twist, Wrench
@@ -110,8 +111,8 @@ def compliance_of(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wre
 
 
 @dataclass(frozen=True)
-class _Shared:
-    """The part of `Statics` that C needs, and the modes of the legs."""
+class _Sharing:
+    """The part of `Statics` that C needs, under the same names, and the modes of the legs."""
 
     modes: Sequence[Modes]
     sharing: Sequence[tuple[Twist, ...]]
@@ -122,7 +123,7 @@ class _Shared:
     round_off: Scalar
 
 
-def _sharing(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench]) -> _Shared:
+def _sharing(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench]) -> _Sharing:
     """The shares of the legs in any load: by statics alone for six wrenches, by least energy for more."""
     redundant = sum(len(leg.wrenches) for leg in legs) + len(guide) > SIZE
     balanced = [free_springs_as_joints(leg.with_unit_wrenches) for leg in legs] if redundant else legs
@@ -138,9 +139,9 @@ def _sharing(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench])
     flexibility: list[Twist] = []
     motions: list[Motion] = []
     sizes: list[Scalar] = []
+    remaining_rows = iter(rows)
     for leg, mode in zip(balanced, modes, strict=True):
-        first = sum(len(shares) for shares in sharing)
-        shares = tuple(Twist(Vector(*row[:3]), Vector(*row[3:])) for row in rows[first : first + len(mode.wrenches)])
+        shares = tuple(Twist(Vector(*row[:3]), Vector(*row[3:])) for row in islice(remaining_rows, len(mode.wrenches)))
         spring_twists = [combine(shares, row) if row else NO_MOTION for row in mode.loads]
         sharing.append(shares)
         flexibility += spring_twists
@@ -153,7 +154,7 @@ def _sharing(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench])
             sizes += leg.load_squares
     loads = [(s, square) for (_, s), square in zip(motions, sizes, strict=True)]
     round_off = _round_off(loads, len(wrenches), singularity_margin, length) if redundant else 0.0
-    return _Shared(
+    return _Sharing(
         modes=modes,
         sharing=sharing,
         flexibility=flexibility,
@@ -188,8 +189,7 @@ def _round_off(
 
 def _in_series(leg: LegScrews) -> bool:
     """Whether the leg has more springs than wrenches, none of them free by form."""
-    free = any(map(is_infinite, leg.compliance))
-    return len(leg.loads) > len(leg.wrenches) and not free
+    return len(leg.loads) > len(leg.wrenches) and not any(map(is_infinite, leg.compliance))
 
 
 def _wrenches_as_modes(leg: LegScrews) -> Modes:
@@ -201,8 +201,8 @@ def in_modes(modes: Sequence[Modes], rows: Sequence[Sequence[Scalar]]) -> list[t
     """Convert amounts of the legs' wrenches to amounts of their modes, a row each; rows of a guide stay as they are."""
     amounts: list[tuple[Scalar, ...]] = []
     for leg in modes:
-        part = rows[len(amounts) : len(amounts) + len(leg.wrenches)]
-        columns = [leg.mode_amounts(column) if leg.mixing else list(column) for column in zip(*part, strict=True)]
+        leg_rows = rows[len(amounts) : len(amounts) + len(leg.wrenches)]
+        columns = [leg.mode_amounts(column) if leg.mixing else list(column) for column in zip(*leg_rows, strict=True)]
         amounts += zip(*columns, strict=True)
     return amounts + [tuple(row) for row in rows[len(amounts) :]]
 
@@ -227,8 +227,8 @@ def without_round_off(compliance: Symmetric6, length: Scalar, round_off: Scalar)
         round_off: what round-off in the loads of its springs makes, as in `Statics`.
     """
     area = length * length
-    turns, moves = (total([compliance.entry(i, i) for i in rows]) for rows in (range(3), range(3, SIZE)))
-    sizes = [turns + reciprocal(area) * moves, moves + area * turns]
+    rotational, translational = (total([compliance.entry(i, i) for i in rows]) for rows in (range(3), range(3, SIZE)))
+    sizes = [rotational + reciprocal(area) * translational, translational + area * rotational]
     limits = [where(size < INFINITE, ROUND_OFF_OF_COMPLIANCE * size, 0.0) for size in sizes]
     limits = [larger(limit, least) for limit, least in zip(limits, (round_off, area * round_off), strict=True)]
     moves = [compliance.entry(i, i) > limits[i // 3] for i in range(SIZE)]
@@ -316,8 +316,8 @@ def weighted_sum(shares: Sequence[tuple[Screw, Scalar]], length: Scalar) -> Symm
         shares: screws a and weights w >= 0, infinity included.
         length: what to multiply translational components by, to compare them with rotational ones, m or 1/m.
     """
-    limited = [where(w < INFINITE, w, 0.0) for _, w in shares]
-    finite = Symmetric6.sum_of([Symmetric6.dyad(a, a) * w for (a, _), w in zip(shares, limited, strict=True)])
+    finite_weights = [where(w < INFINITE, w, 0.0) for _, w in shares]
+    finite = Symmetric6.sum_of([Symmetric6.dyad(a, a) * w for (a, _), w in zip(shares, finite_weights, strict=True)])
     reached = [_beyond_round_off(screw, length) for screw, _ in shares]
     endless = [
         [where(w < INFINITE, 0.0, where(flag, 1.0, 0.0)) for flag in flags]
@@ -326,24 +326,24 @@ def weighted_sum(shares: Sequence[tuple[Screw, Scalar]], length: Scalar) -> Symm
     entries = []
     for k, (i, j) in enumerate(POSITIONS):
         if i == j:  # a sum of squares stays infinite by itself, which takes half of the arithmetic
-            weights = [where(flags[i], w, least) for flags, (_, w), least in zip(reached, shares, limited, strict=True)]
+            weights = [
+                where(flags[i], w, finite_weight)
+                for flags, (_, w), finite_weight in zip(reached, shares, finite_weights, strict=True)
+            ]
             squares = [a.components()[i] * a.components()[i] for a, _ in shares]
             entries.append(total([square * w for square, w in zip(squares, weights, strict=True)]))
         else:
-            together = total([flags[i] * flags[j] for flags in endless])
-            entries.append(where(together > 0.5, INFINITE, finite.upper[k]))
+            endless_shares = total([flags[i] * flags[j] for flags in endless])  # a whole number over any scalar
+            entries.append(where(endless_shares > 0.5, INFINITE, finite.upper[k]))
     return Symmetric6(tuple(entries))
 
 
 def _beyond_round_off(screw: Screw, length: Scalar) -> list[Scalar]:
     """For each component of the screw, whether it is more than round-off, so that an infinite weight reaches it."""
-    sizes = [c * c * scale for c, scale in zip(screw.components(), _squares(length), strict=True)]
-    limit = UNREACHED_COMPONENT * total(sizes)
-    return [size > limit for size in sizes]
-
-
-def _squares(length: Scalar) -> list[Scalar]:
-    return [1.0] * 3 + [length * length] * 3
+    units = [1.0] * 3 + [length * length] * 3
+    squares = [c * c * unit for c, unit in zip(screw.components(), units, strict=True)]
+    limit = UNREACHED_COMPONENT * total(squares)
+    return [square > limit for square in squares]
 
 
 def compliance_shares(statics: Statics) -> list[Symmetric6]:

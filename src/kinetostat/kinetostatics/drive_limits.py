@@ -4,11 +4,11 @@ What drives can do within them is in `feasible`. Over scalars.
 """
 
 import math
-from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, smaller, where
 from kinetostat.frozen import dataclass
 from kinetostat.machine.actuators import numbers_of_drive
+from kinetostat.machine.common_tables import Drives, ServoGains
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.limits import is_set
 from kinetostat.machine.machine import Configuration, Machine
@@ -24,7 +24,7 @@ class DriveLimits:
             open; infinite if not limited.
         speed: greatest speed of the actuator, either way, m/s or rad/s; infinite if not limited.
         lost_motion: what its joint misses between both senses of motion, m or rad, theory (105).
-        softness: compliance of its joint at rest, with its servo loop if it has one, m/N or rad/(N·m).
+        compliance: compliance of its joint at rest, with its servo loop if it has one, m/N or rad/(N·m).
     """
 
     spring: Spring
@@ -32,7 +32,7 @@ class DriveLimits:
     upper: Scalar
     speed: Scalar
     lost_motion: Scalar = 0.0
-    softness: Scalar = 0.0
+    compliance: Scalar = 0.0
 
 
 def drive_limits(machine: Machine, configuration: Configuration) -> tuple[DriveLimits, ...]:
@@ -40,37 +40,39 @@ def drive_limits(machine: Machine, configuration: Configuration) -> tuple[DriveL
 
     Loads are those of [limits]; where an actuator only pulls or only pushes, the tensions of [load] bound it as well.
     """
-    limits, load = machine.tables["limits"], machine.tables["load"]
-    result = []
+    limits, drives = machine.tables["limits"], []
     for spring in driven_springs(configuration):
-        slides = spring.joint.point is None
-        most = limits.actuator_force if slides else limits.actuator_moment
-        lower, upper = -most if is_set(most) else -math.inf, most
-        if spring.acts:
-            least = load.min_tension if is_set(load.min_tension) else 0.0
-            greatest = most
-            if is_set(load.max_tension):
-                greatest = smaller(most, load.max_tension) if is_set(most) else load.max_tension
-            lower, upper = (least, greatest) if spring.acts == "pulls" else (-greatest, -least)
-        result.append(
-            DriveLimits(
-                spring=spring,
-                lower=lower,
-                upper=upper,
-                speed=limits.actuator_speed if slides else limits.actuator_turning_speed,
-                lost_motion=lost_motion(machine, spring),
-                softness=softness(machine, spring),
-            )
+        lower, upper = _load_bounds(machine, spring)
+        drive = DriveLimits(
+            spring=spring,
+            lower=lower,
+            upper=upper,
+            speed=limits.actuator_speed if spring.joint.point is None else limits.actuator_turning_speed,
+            lost_motion=lost_motion(machine, spring),
+            compliance=joint_compliance(machine, spring),
         )
-    return tuple(result)
+        drives.append(drive)
+    return tuple(drives)
+
+
+def _load_bounds(machine: Machine, spring: Spring) -> tuple[Scalar, Scalar]:
+    """Least and greatest load of a drive, N or N·m: `lower` and `upper` of `DriveLimits`."""
+    limits, load = machine.tables["limits"], machine.tables["load"]
+    most = limits.actuator_force if spring.joint.point is None else limits.actuator_moment
+    if not spring.acts:
+        return -most if is_set(most) else -math.inf, most
+    least = load.min_tension if is_set(load.min_tension) else 0.0
+    if is_set(load.max_tension):
+        most = smaller(most, load.max_tension) if is_set(most) else load.max_tension
+    return (least, most) if spring.acts == "pulls" else (-most, -least)
 
 
 def lost_motion(machine: Machine, spring: Spring) -> Scalar:
     """Return how far the joint of a drive stays behind where the sense of its motion changes.
 
-    The play counts as far as the encoder does not see it, and the friction of the rotor only where the servo loop has
-    no integral part, which would remove it. The friction of a guide or a bearing is a load on the joint, once in each
-    sense.
+    Backlash counts as far as the encoder does not see it. The friction of a guide or a bearing is a load on the joint:
+    it counts twice, once for each sense, times the compliance of the joint. The friction of the rotor counts twice as
+    well, but only where the servo loop has no integral part, which would remove it.
 
     Args:
         machine: the machine with its tables [drives] and [servo].
@@ -82,24 +84,24 @@ def lost_motion(machine: Machine, spring: Spring) -> Scalar:
     Source: theory (105).
     """
     drive, servo = _tables_of(machine, spring)
-    slides, distance = spring.joint.point is None, play(machine, spring)
+    slides, distance = spring.joint.point is None, unseen_backlash(machine, spring)
     friction = drive.guide_friction if slides else drive.bearing_friction
     if not is_zero(friction):
-        distance = distance + softness(machine, spring) * (2.0 * friction)
+        distance = distance + joint_compliance(machine, spring) * (2.0 * friction)
     if is_zero(drive.rotor_friction) or not (_is_closed(servo) and is_zero(servo.integral_time)):
         return distance
-    angle = 2.0 * drive.rotor_friction * _inverse(_loop_stiffness(servo))
-    return distance + angle * _travel_per_radian(drive, slides)
+    rotor_angle = 2.0 * drive.rotor_friction * _inverse(_loop_stiffness(servo))
+    return distance + rotor_angle * _travel_per_radian(drive, slides)
 
 
-def play(machine: Machine, spring: Spring) -> Scalar:
-    """The play of a drive as far as its encoder does not see it, m or rad."""
+def unseen_backlash(machine: Machine, spring: Spring) -> Scalar:
+    """The backlash of a drive as far as its encoder does not see it, m or rad."""
     drive, servo = _tables_of(machine, spring)
     backlash = drive.backlash if spring.joint.point is None else drive.angular_backlash
     return (1.0 - servo.position_at_load) * backlash
 
 
-def softness(machine: Machine, spring: Spring) -> Scalar:
+def joint_compliance(machine: Machine, spring: Spring) -> Scalar:
     """Compliance of the joint of a drive at rest, m/N or rad/(N·m): with its servo loop if it has one.
 
     Args:
@@ -119,17 +121,17 @@ def softness(machine: Machine, spring: Spring) -> Scalar:
     return where(loop > 0.0, compliance, transmission)
 
 
-def _tables_of(machine: Machine, spring: Spring) -> tuple[Any, Any]:
+def _tables_of(machine: Machine, spring: Spring) -> tuple[Drives, ServoGains]:
     """The tables [drives] and [servo] as this drive has them."""
     return numbers_of_drive(machine, "drives", spring), numbers_of_drive(machine, "servo", spring)
 
 
-def _loop_stiffness(servo: Any) -> Scalar:
+def _loop_stiffness(servo: ServoGains) -> Scalar:
     """Torque of the rotor per angle by which it is off its set point at rest, N·m/rad, without an integral part."""
     return servo.velocity_gain * servo.position_gain
 
 
-def _travel_per_radian(drive: Any, slides: bool) -> Scalar:
+def _travel_per_radian(drive: Drives, slides: bool) -> Scalar:
     """Travel of the joint per radian of its rotor, m/rad or 1.
 
     It is 0 without a lead or a ratio, where `machine.actuators.rotor_turns`, the reciprocal, refuses a rotor: here such
@@ -143,8 +145,8 @@ def _inverse(a: Scalar) -> Scalar:
     return where(a > 0.0, reciprocal(where(a > 0.0, a, 1.0)), 0.0)
 
 
-def _is_closed(servo: Any) -> bool:
-    """Whether a drive has a servo loop, by the form of its table [servo]."""
+def _is_closed(servo: ServoGains) -> bool:
+    """Whether a drive has a servo loop, by the form of its table: a gain that varies counts, also where it is 0."""
     return not (is_zero(servo.velocity_gain) or is_zero(servo.position_gain))
 
 

@@ -13,7 +13,7 @@ ASME DE-72, 1994.
 
 import math
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -67,7 +67,7 @@ def eigenscrews(stiffness: Matrix) -> list[Eigenscrew]:
     Raises:
         ValueError: K is not 6 x 6 and finite.
     """
-    return [_eigenscrew(*term, term[0]) for term in _terms(_finite(stiffness), line=FORCE, moment=MOMENT)]
+    return [_eigenscrew(dyad, dyad.product) for dyad in _dyads(_finite(stiffness), line=FORCE, moment=MOMENT)]
 
 
 def compliance_eigenscrews(compliance: Matrix) -> list[Eigenscrew]:
@@ -75,8 +75,8 @@ def compliance_eigenscrews(compliance: Matrix) -> list[Eigenscrew]:
 
     With C = F F^T their twists are t = F y with F^T Delta F y = y / lambda. Arguments and results as for `eigenscrews`.
     """
-    terms = _terms(_finite(compliance), line=ROTATION, moment=TRANSLATION)
-    screws = [_eigenscrew(*term, 1.0 / term[0] if term[0] else math.inf) for term in terms]
+    terms = _dyads(_finite(compliance), line=ROTATION, moment=TRANSLATION)
+    screws = [_eigenscrew(dyad, 1.0 / dyad.product if dyad.product else math.inf) for dyad in terms]
     return sorted(screws, key=lambda screw: screw.eigenvalue)
 
 
@@ -87,8 +87,21 @@ def _finite(matrix: Matrix) -> Array:
     return array
 
 
-def _terms(matrix: Array, line: slice, moment: slice) -> list[tuple[float, Array, Array]]:
-    """Return the eigenscrews of a matrix, the sum of their dyads: twice line . moment, the line and the moment.
+class _Dyad(NamedTuple):
+    """A screw whose dyad is a term of the sum that a matrix is.
+
+    Attributes:
+        product: twice line . moment.
+        line, moment: the halves of the screw [3]: its direction, and its moment about P.
+    """
+
+    product: float
+    line: Array
+    moment: Array
+
+
+def _dyads(matrix: Array, line: slice, moment: slice) -> list[_Dyad]:
+    """Return the eigenscrews of a matrix, which is the sum of their dyads; `line` and `moment` are rows of it.
 
     They are computed in a unit of length in which both diagonal blocks have the same trace. A line that is only
     round-off is set to zero.
@@ -98,25 +111,25 @@ def _terms(matrix: Array, line: slice, moment: slice) -> list[tuple[float, Array
     scale = np.ones(6)
     scale[moment] = 1.0 / length
     values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
-    kept = values > ZERO_EIGENSCREW * values[-1]
-    factor = vectors[:, kept] * np.sqrt(values[kept])
-    products, mixed = np.linalg.eigh(factor.T @ np.roll(factor, 3, axis=0))
+    is_term = values > ZERO_EIGENSCREW * values[-1]
+    factor = vectors[:, is_term] * np.sqrt(values[is_term])
+    products, mixes = np.linalg.eigh(factor.T @ np.roll(factor, 3, axis=0))
     products[np.abs(products) <= ZERO_EIGENSCREW * values[-1]] = 0.0
-    screws = (factor @ mixed).T
-    pure = np.linalg.norm(screws[:, line], axis=1) <= PURE_COUPLE * np.linalg.norm(screws, axis=1)
-    screws[pure, line] = 0.0
-    return [(float(p) * length, w[line], w[moment] * length) for p, w in zip(products, screws, strict=True)]
+    screws = (factor @ mixes).T
+    is_couple = np.linalg.norm(screws[:, line], axis=1) <= PURE_COUPLE * np.linalg.norm(screws, axis=1)
+    screws[is_couple, line] = 0.0
+    return [_Dyad(float(p) * length, w[line], w[moment] * length) for p, w in zip(products, screws, strict=True)]
 
 
-def _eigenscrew(product: float, line: Array, moment: Array, eigenvalue: float) -> Eigenscrew:
-    """The eigenscrew of a term of the sum: its pitch is line . moment over line . line."""
-    pure = not line.any()
-    axis = moment if pure else line
+def _eigenscrew(dyad: _Dyad, eigenvalue: float) -> Eigenscrew:
+    """The eigenscrew of a dyad: its pitch is line . moment over line . line."""
+    is_couple = not dyad.line.any()
+    axis = dyad.moment if is_couple else dyad.line
     size = float(np.linalg.norm(axis))
     direction = axis * math.copysign(1.0 / size, axis[np.argmax(np.abs(axis))])
-    point = None if pure else np.cross(line, moment) / size**2
-    pitch = math.inf if pure else 0.5 * product / size**2
-    return Eigenscrew(eigenvalue, pitch, direction, point, size**2)
+    point = None if is_couple else np.cross(dyad.line, dyad.moment) / size**2
+    pitch = math.inf if is_couple else 0.5 * dyad.product / size**2
+    return Eigenscrew(eigenvalue, pitch, direction, point, weight=size**2)
 
 
 Point: TypeAlias = Array
@@ -126,8 +139,8 @@ Point: TypeAlias = Array
 def centre_of_stiffness(stiffness: Matrix | None, components: Sequence[int] = SPATIAL) -> Point | None:
     """The point at which the coupling block of K is symmetric: (tr(K_tt) 1 - K_tt) d = vee(K_rt - K_tr).
 
-    Of a planar machine, where it is zero: a force through it causes no rotation. Loncaric (1987); Ciblak and Lipkin
-    (1994).
+    In a planar machine the block is zero there: a force through the point causes no rotation. Source: Loncaric (1987);
+    Ciblak and Lipkin (1994).
 
     Args:
         stiffness: K at P, base axes [6 x 6], or [3 x 3] with rows rz x y.

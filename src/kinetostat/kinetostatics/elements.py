@@ -6,8 +6,9 @@ Source: theory (10) and (33), eqs. 33-38. C and K are at the response's referenc
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -52,54 +53,61 @@ class Element:
     stiffness: float | None
 
 
+class _NumberedSpring(NamedTuple):
+    """A spring with its place in the order of all springs of the machine."""
+
+    number: int
+    spring: Spring
+
+
 def elements(configuration: Configuration) -> list[Element]:
     """The elastic elements of a machine, actuators first.
 
-    Springs that are free carry nothing and are none, nor is a part of several springs that are all rigid.
+    Springs that are free carry nothing and belong to no element; nor do parts of several springs that are all rigid.
+    Parts are alike if they have the same kind and units and are in legs whose parts have the same kinds.
     """
-    groups: dict[tuple[object, ...], dict[str, list[tuple[int, Spring]]]] = {}
+    groups: dict[Hashable, dict[str, list[_NumberedSpring]]] = {}
     number = 0
     for leg in configuration.legs:
-        parts: dict[str, list[tuple[int, Spring]]] = {}
+        springs_of_part: dict[str, list[_NumberedSpring]] = {}
         for spring in leg.springs:
             if spring.stiffness != 0.0:
-                parts.setdefault(spring.part_name, []).append((number, spring))
+                springs_of_part.setdefault(spring.part_name, []).append(_NumberedSpring(number, spring))
             number += 1
-        alike = tuple((numbered[0][1].kind, len(numbered)) for numbered in parts.values())
-        for part, numbered in parts.items():
-            if len(numbered) > 1 and all(spring.stiffness == math.inf for _, spring in numbered):
+        kinds_in_leg = tuple((springs[0].spring.kind, len(springs)) for springs in springs_of_part.values())
+        for part, springs in springs_of_part.items():
+            if len(springs) > 1 and all(spring.stiffness == math.inf for _, spring in springs):
                 continue
-            label = numbered[0][1].kind
-            kind = (label, tuple(_unit(spring) for _, spring in numbered), numbered[0][1].actuated, alike)
-            groups.setdefault(kind, {})[part] = numbered
-    result = [_element(str(kind[0]), parts) for kind, parts in groups.items()]
-    return sorted(result, key=lambda element: not element.actuated)
+            first, units = springs[0].spring, tuple(_unit(spring) for _, spring in springs)
+            groups.setdefault((first.kind, units, first.actuated, kinds_in_leg), {})[part] = springs
+    return sorted((_element(parts) for parts in groups.values()), key=lambda element: not element.actuated)
 
 
-def with_links_together(alone: Sequence[Element]) -> list[Element]:
-    """The elements, and all that are no actuators once more as one, where there are several of them."""
-    links = [element for element in alone if not element.actuated]
-    if len(links) < 2 or len(links) == len(alone):
-        return list(alone)
+def with_links_together(single: Sequence[Element]) -> list[Element]:
+    """The elements; where several of them are not actuators, and others are, also one of all that are not."""
+    links = [element for element in single if not element.actuated]
+    if len(links) < 2 or len(links) == len(single):
+        return list(single)
     parts = tuple(part for element in links for part in element.parts)
     springs = tuple(place for element in links for place in element.springs)
-    units, sizes = {element.unit for element in links}, {element.stiffness for element in links}
-    alike = len(units) == len(sizes) == 1
-    unit, stiffness = (units.pop(), sizes.pop()) if alike else ("", None)
-    return [*alone, Element(LINKS_TOGETHER, parts, springs, False, unit, stiffness)]
+    units, values = {element.unit for element in links}, {element.stiffness for element in links}
+    are_alike = len(units) == len(values) == 1
+    unit, stiffness = (units.pop(), values.pop()) if are_alike else ("", None)
+    return [*single, Element(LINKS_TOGETHER, parts, springs, actuated=False, unit=unit, stiffness=stiffness)]
 
 
-def _element(label: str, parts: Mapping[str, Sequence[tuple[int, Spring]]]) -> Element:
+def _element(parts: Mapping[str, Sequence[_NumberedSpring]]) -> Element:
+    """The element of parts that are alike, by name."""
     springs = [spring for numbered in parts.values() for _, spring in numbered]
-    single = len(springs) == len(parts)
-    sizes = {float(spring.stiffness) for spring in springs}
+    one_spring_each = len(springs) == len(parts)
+    stiffnesses = {float(spring.stiffness) for spring in springs}
     return Element(
-        name=f"{label} ×{len(parts)}" if len(parts) > 1 else next(iter(parts)),
+        name=f"{springs[0].kind} ×{len(parts)}" if len(parts) > 1 else next(iter(parts)),
         parts=tuple(parts),
         springs=tuple(number for numbered in parts.values() for number, _ in numbered),
         actuated=springs[0].actuated,
-        unit=_unit(springs[0]) if single else "",
-        stiffness=sizes.pop() if single and len(sizes) == 1 else None,
+        unit=_unit(springs[0]) if one_spring_each else "",
+        stiffness=stiffnesses.pop() if one_spring_each and len(stiffnesses) == 1 else None,
     )
 
 
@@ -119,10 +127,10 @@ def element_share(response: Response, element: Element) -> list[Scalar]:
 
 def diagonal_with(response: Response, element: Element, factor: Scalar) -> list[Scalar]:
     """The six diagonal entries of C once the compliances of an element are multiplied by a factor >= 0; 0 is rigid."""
-    chosen, number, legs = _weights(response, element), 0, []
+    weights, number, legs = _weights(response, element), 0, []
     for leg in response.legs:
         places = range(number, number + len(leg.compliance))
-        compliance = [chosen[i] * factor if i in chosen else s for i, s in zip(places, leg.compliance, strict=True)]
+        compliance = [weights[i] * factor if i in weights else s for i, s in zip(places, leg.compliance, strict=True)]
         legs.append(replace(leg, compliance=tuple(compliance)))
         number += len(leg.compliance)
     return list(compliance_of(legs, response.statics.length, response.guide).diagonal())
@@ -167,9 +175,9 @@ def is_isostatic(response: Response) -> bool:
 
 
 def stiffness_equations(response: Response, parts: Sequence[Element]) -> dict[str, Symmetric6] | None:
-    """K as a sum over elements of stiffness times a matrix that no stiffness is in: eqs. 33-38, all entries.
+    """K as a sum over elements: of each, the matrix that its stiffness multiplies; eqs. 33-38, all entries.
 
-    None where there is no such sum: where springs of a leg work in a row, a part has several, or an element has several
+    None where there is no such sum: where springs of a leg are in series, a part has several, or an element has several
     stiffnesses.
     """
     square = all(len(leg.loads) == len(leg.wrenches) for leg in response.legs)
@@ -180,6 +188,7 @@ def stiffness_equations(response: Response, parts: Sequence[Element]) -> dict[st
 
 
 def _weights(response: Response, element: Element) -> dict[int, Scalar]:
+    """The compliances of the springs of an element by their numbers; 1 (SI) for each spring of a rigid one."""
     compliance = response.statics.compliance
     return {i: 1.0 if element.stiffness == math.inf else compliance[i] for i in element.springs}
 
@@ -203,9 +212,9 @@ def _factor_for(response: Response, element: Element, rest: Array, excess: Array
         y = 1.0 / excess_with(1.0 / x)
         slope = (y - y_before) / (x - x_before)
         step = np.where(np.isfinite(slope) & (slope > 0.0), (wanted - y) / slope, 0.0)
-        settled = not (np.abs(step) > SETTLED * x).any()
+        is_last = not (np.abs(step) > SETTLED * x).any()
         x_before, y_before, x = x, y, np.where(x + step > 0.0, x + step, 0.5 * x)
-        if settled:
+        if is_last:
             break
-    never = excess_with(np.full_like(rest, SOFTEST)) <= excess
-    return np.where(rest > 0.0, np.where(never, math.inf, 1.0 / x), 0.0)
+    is_unreached = excess_with(np.full_like(rest, SOFTEST)) <= excess
+    return np.where(rest > 0.0, np.where(is_unreached, math.inf, 1.0 / x), 0.0)

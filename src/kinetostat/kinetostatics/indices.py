@@ -14,7 +14,7 @@ Source: theory section 10; for conditioning J. Salisbury and J. Craig, "Articula
 
 import math
 from collections.abc import Sequence
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -42,7 +42,7 @@ PLANAR = (2, 3, 4)
 
 
 @dataclass(frozen=True, eq=False)
-class Principal(ImmutableAnswer):
+class PrincipalCompliances(ImmutableAnswer):
     """Principal compliances of one block, the other free, in increasing order.
 
     Attributes:
@@ -81,11 +81,11 @@ def finite(matrix: Matrix | None, components: Sequence[int] = SPATIAL) -> Array 
     return array if bool(np.isfinite(array).all()) else None
 
 
-def principal_compliances(compliance: Matrix, components: Sequence[int] = SPATIAL) -> dict[str, Principal]:
-    """Principal compliances of the platform, from its softest to its stiffest direction, for rotation and translation.
+def principal_compliances(compliance: Matrix, components: Sequence[int] = SPATIAL) -> dict[str, PrincipalCompliances]:
+    """Principal compliances of the platform, from its stiffest to its softest direction, for rotation and translation.
 
-    Under a pure moment (force) along a direction, the rotation (translation) it causes along itself; the extremes of
-    that are the eigenvalues of the diagonal block C_rr (C_tt).
+    A compliance is the rotation (translation) that a pure moment (force) along a direction causes along itself. Its
+    extremes over all directions are the eigenvalues of the diagonal block C_rr (C_tt).
 
     Args:
         compliance: C at P, base axes, all entries finite [n x n].
@@ -100,10 +100,10 @@ def principal_compliances(compliance: Matrix, components: Sequence[int] = SPATIA
     matrix = finite(compliance, components)
     if matrix is None:
         raise ValueError("principal compliances need a finite C: where a spring is free there is none")
-    result: dict[str, Principal] = {}
-    for name, inside, _, axes in _blocks(components):
-        values, vectors = np.linalg.eigh(matrix[np.ix_(inside, inside)])
-        result[name] = Principal(np.maximum(values, 0.0), vectors.T @ axes)
+    result: dict[str, PrincipalCompliances] = {}
+    for block in _blocks(components):
+        values, vectors = np.linalg.eigh(block.part(matrix)[0])
+        result[block.name] = PrincipalCompliances(np.maximum(values, 0.0), vectors.T @ block.axes)
     return result
 
 
@@ -112,8 +112,9 @@ def free_stiffnesses(
 ) -> dict[str, PrincipalStiffness] | None:
     """Principal stiffnesses against a pure force (moment) while the rotations (translations) follow: 1 / eig(C_bb).
 
-    What a tool feels at P of a machine held by its legs alone. From K it is eig(K_bb - K_bo K_oo^+ K_ob). Where C is
-    not finite, a direction is free, and what can be round-off of a stiffness counts as none.
+    A tool meets this stiffness at P where nothing but the legs holds the platform. From K it is
+    eig(K_bb - K_bo K_oo^+ K_ob). Where C is not finite, some direction is free, and a stiffness that may be round-off
+    counts as zero.
 
     Args:
         stiffness, compliance: K and C at P, base axes [n x n]; C is used where it is finite.
@@ -126,7 +127,12 @@ def free_stiffnesses(
         ValueError: if a matrix has another shape.
     """
     soft, stiff = finite(compliance, components), finite(stiffness, components)
-    return _ellipsoids(soft, stiff, components, inverse=soft is not None, known_free=soft is None)
+    if soft is not None:
+        return {block.name: _of_compliances(block, *block.part(soft)) for block in _blocks(components)}
+    if stiff is not None:
+        blocks = _blocks(components)
+        return {block.name: _of_stiffnesses(block, *block.complement(stiff, some_free=True)) for block in blocks}
+    return None
 
 
 def guided_stiffnesses(
@@ -134,12 +140,16 @@ def guided_stiffnesses(
 ) -> dict[str, PrincipalStiffness] | None:
     """Principal stiffnesses against a displacement (rotation) while the other block is held at zero: eig(K_bb).
 
-    What remains if something else, a second guide or a clamped workpiece, takes the rotations; an upper bound of
-    `free_stiffnesses`. From C it is 1 / eig(C_bb - C_bo C_oo^+ C_ob). Arguments, results and errors as there; K is
-    used where it is finite.
+    These stiffnesses remain if something else, a second guide or a clamped workpiece, takes the rotations; they are at
+    least those of `free_stiffnesses`. From C they are 1 / eig(C_bb - C_bo C_oo^+ C_ob). Arguments, results and errors
+    are as there; K is used where it is finite.
     """
     soft, stiff = finite(compliance, components), finite(stiffness, components)
-    return _ellipsoids(stiff, soft, components, inverse=stiff is None)
+    if stiff is not None:
+        return {block.name: _of_stiffnesses(block, *block.part(stiff)) for block in _blocks(components)}
+    if soft is not None:
+        return {block.name: _of_compliances(block, *block.complement(soft)) for block in _blocks(components)}
+    return None
 
 
 def free_stiffness_along(
@@ -149,7 +159,7 @@ def free_stiffness_along(
     compliance: Matrix | None,
     components: Sequence[int] = SPATIAL,
 ) -> float | None:
-    """Force along n over the displacement along n it causes, all else free to follow: 1 / (n^T C_bb n).
+    """Force along n over the displacement along n it causes, with all other motions free: 1 / (n^T C_bb n).
 
     Args:
         direction: n times any length, base axes [3]; along an axis that has no component it must be zero.
@@ -178,7 +188,10 @@ def guided_stiffness_along(
     compliance: Matrix | None,
     components: Sequence[int] = SPATIAL,
 ) -> float | None:
-    """Force along n over a displacement along n, all else held at zero: n^T K_bb n. Arguments as for the free one."""
+    """Force along n over a displacement along n, with all other motions held: n^T K_bb n.
+
+    Arguments, results and errors are as for `free_stiffness_along`.
+    """
     blocks = guided_stiffnesses(stiffness, compliance, components)
     shares = _shares(direction, block, components, blocks)
     if blocks is None:
@@ -186,53 +199,76 @@ def guided_stiffness_along(
     return math.fsum(s * k for s, k in zip(shares, blocks[block].stiffnesses.tolist(), strict=True) if s)
 
 
-def _blocks(components: Sequence[int]) -> list[tuple[Block, list[int], list[int], Array]]:
-    """Return of each block that exists name, rows, the other block's rows, and base axes of its rows [n x 3]."""
-    turns = [i for i, c in enumerate(components) if c < 3]
-    moves = [i for i, c in enumerate(components) if c >= 3]
-    axes = np.eye(3)[[c % 3 for c in components]]
-    parts: list[tuple[Block, list[int], list[int]]] = [("rotation", turns, moves), ("translation", moves, turns)]
-    return [(name, inside, other, axes[inside]) for name, inside, other in parts if inside]
+class _DiagonalBlock(NamedTuple):
+    """The rotations or the translations among the components of a machine.
 
-
-def _ellipsoids(
-    direct: Array | None, dual: Array | None, components: Sequence[int], inverse: bool, known_free: bool = False
-) -> dict[str, PrincipalStiffness] | None:
-    """From the blocks of `direct`, or else Schur complements of `dual`; `inverse` says that C is what is used.
-
-    Where it is `known_free` that some direction has no stiffness, all is taken for that which round-off can have left
-    of it: the complement loses as many digits as the condition of the other block has.
+    Attributes:
+        name: "rotation" or "translation".
+        rows: its rows in a matrix of all components, n of them.
+        other_rows: the rows of the other block.
+        axes: the base axis of each of its rows [n x 3].
     """
-    matrix = dual if direct is None else direct
-    if matrix is None:
-        return None
-    result: dict[str, PrincipalStiffness] = {}
-    for name, inside, other, axes in _blocks(components):
-        block = matrix[np.ix_(inside, inside)]
-        size, share = float(np.linalg.norm(block, 2)), ROUND_OFF_OF_EIGENVALUE
-        if direct is None and other:
-            coupling, opposite = matrix[np.ix_(inside, other)], matrix[np.ix_(other, other)]
-            share = ROUND_OFF_OF_COMPLEMENT
-            if known_free:
-                sizes = np.linalg.svd(opposite, compute_uv=False)
-                least = sizes[sizes > ROUND_OFF_OF_COMPLEMENT * sizes[0]].min(initial=sizes[0])
-                share = min(max(share, ROUND_OFF_OF_EIGENVALUE * sizes[0] / max(least, LEAST_DIVISOR)), LARGEST_FREE)
-            block = block - coupling @ np.linalg.pinv(opposite, ROUND_OFF_OF_COMPLEMENT, hermitian=True) @ coupling.T
-        values, vectors = np.linalg.eigh(block)
-        stiffnesses = [0.0 if value <= share * size else float(value) for value in values]
-        order = range(len(inside))
-        if inverse:
-            stiffnesses, order = [reciprocal(value) for value in stiffnesses], range(len(inside) - 1, -1, -1)
-        chosen = list(order)
-        result[name] = PrincipalStiffness(np.array(stiffnesses)[chosen], (vectors.T @ axes)[chosen])
-    return result
+
+    name: Block
+    rows: list[int]
+    other_rows: list[int]
+    axes: Array
+
+    def part(self, matrix: Array) -> tuple[Array, float]:
+        """Return this block of K or C [n x n], and the size up to which an eigenvalue of it may be round-off."""
+        part = matrix[np.ix_(self.rows, self.rows)]
+        return part, ROUND_OFF_OF_EIGENVALUE * float(np.linalg.norm(part, 2))
+
+    def complement(self, matrix: Array, some_free: bool = False) -> tuple[Array, float]:
+        """Return the Schur complement of the other block in K or C [n x n], and its round-off as `part` does.
+
+        Where some direction is known to be free, the complement loses as many digits as the condition of the other
+        block has.
+        """
+        part, round_off = self.part(matrix)
+        if not self.other_rows:
+            return part, round_off
+        coupling = matrix[np.ix_(self.rows, self.other_rows)]
+        opposite = matrix[np.ix_(self.other_rows, self.other_rows)]
+        share = ROUND_OFF_OF_COMPLEMENT
+        if some_free:
+            sizes = np.linalg.svd(opposite, compute_uv=False)
+            least = sizes[sizes > ROUND_OFF_OF_COMPLEMENT * sizes[0]].min(initial=sizes[0])
+            share = min(max(share, ROUND_OFF_OF_EIGENVALUE * sizes[0] / max(least, LEAST_DIVISOR)), LARGEST_FREE)
+        inverse = np.linalg.pinv(opposite, ROUND_OFF_OF_COMPLEMENT, hermitian=True)
+        return part - coupling @ inverse @ coupling.T, share * float(np.linalg.norm(part, 2))
+
+
+def _blocks(components: Sequence[int]) -> list[_DiagonalBlock]:
+    """Return each block that the machine has."""
+    turns = [row for row, component in enumerate(components) if component < 3]
+    moves = [row for row, component in enumerate(components) if component >= 3]
+    axes = np.eye(3)[[component % 3 for component in components]]
+    blocks = [
+        _DiagonalBlock("rotation", turns, moves, axes[turns]),
+        _DiagonalBlock("translation", moves, turns, axes[moves]),
+    ]
+    return [block for block in blocks if block.rows]
+
+
+def _of_stiffnesses(block: _DiagonalBlock, matrix: Array, round_off: float) -> PrincipalStiffness:
+    """Return the eigenvalues of a matrix of stiffnesses [n x n], zero where they may be round-off."""
+    values, vectors = np.linalg.eigh(matrix)
+    return PrincipalStiffness(np.where(values <= round_off, 0.0, values), vectors.T @ block.axes)
+
+
+def _of_compliances(block: _DiagonalBlock, matrix: Array, round_off: float) -> PrincipalStiffness:
+    """Return the reciprocal eigenvalues of a matrix of compliances [n x n], infinite where these may be round-off."""
+    values, vectors = np.linalg.eigh(matrix)
+    stiffnesses = [math.inf if value <= round_off else reciprocal(float(value)) for value in values[::-1]]
+    return PrincipalStiffness(np.array(stiffnesses), (vectors.T @ block.axes)[::-1])
 
 
 def _shares(
     direction: Sequence[float], block: Block, components: Sequence[int], blocks: dict[str, PrincipalStiffness] | None
 ) -> list[float]:
     """Squares of the cosines between a direction and the principal ones; exactly zero where it is at right angles."""
-    axes = {name: rows for name, _, _, rows in _blocks(components)}.get(block)
+    axes = next((known.axes for known in _blocks(components) if known.name == block), None)
     vector = np.asarray(direction, dtype=float)
     size = float(np.linalg.norm(vector))
     if (
@@ -276,7 +312,7 @@ def stiffness_condition(
 def twist_condition(twists: npt.ArrayLike, length: float, components: Sequence[int] = SPATIAL) -> float:
     """Condition number of a Jacobian whose columns are twists, angles multiplied by `length`: sigma_max / sigma_min.
 
-    Introduced for Jacobians by Salisbury and Craig, "Articulated hands", Int. J. Robotics Research 1(1), 1982.
+    It was introduced for Jacobians by Salisbury and Craig (1982).
 
     Args:
         twists: unit twists of the actuators at P, base axes [n x m], rotations (rad) above translations (m); of
@@ -290,7 +326,11 @@ def twist_condition(twists: npt.ArrayLike, length: float, components: Sequence[i
     Raises:
         ValueError: if the length is not positive, or the array is not [n x m] and finite.
     """
-    return _condition(twists, _scale(components, _positive(length)))
+    scale, matrix = _scale(components, _positive(length)), np.asarray(twists, dtype=float)
+    if matrix.ndim != 2 or len(matrix) != len(scale) or not matrix.size or not np.isfinite(matrix).all():
+        raise ValueError(f"screws are {len(scale)} rows of finite numbers, one column each, not {matrix.shape}")
+    values = np.linalg.svd(matrix * scale[:, None], compute_uv=False)
+    return _ratio(values[0], values[-1])
 
 
 def _positive(length: float) -> float:
@@ -301,14 +341,6 @@ def _positive(length: float) -> float:
 
 def _scale(components: Sequence[int], rotational: float) -> Array:
     return np.array([rotational if c < 3 else 1.0 for c in components])
-
-
-def _condition(screws: npt.ArrayLike, scale: Array) -> float:
-    matrix = np.asarray(screws, dtype=float)
-    if matrix.ndim != 2 or len(matrix) != len(scale) or not matrix.size or not np.isfinite(matrix).all():
-        raise ValueError(f"screws are {len(scale)} rows of finite numbers, one column each, not {matrix.shape}")
-    values = np.linalg.svd(matrix * scale[:, None], compute_uv=False)
-    return _ratio(values[0], values[-1])
 
 
 def _ratio(largest: float, smallest: float) -> float:

@@ -168,18 +168,20 @@ class Modes:
 def modes_of(leg: LegScrews) -> Modes:
     """The modes of a leg; each is one of its wrenches less a mix of those before."""
     springs = len(leg.loads)
+    # A column for each wrench: its loads in the springs, then its own components, which are carried along.
     columns = [(*(row[k] for row in leg.loads), *wrench.components()) for k, wrench in enumerate(leg.wrenches)]
     modes = conjugate(columns, leg.compliance, leg.load_squares)
     combined, pivots = modes.columns, modes.pivots
     if all(map(is_bounded, leg.compliance)):
         pivots = [finite(pivot) for pivot in pivots]
+    halves = [(column[springs : springs + 3], column[springs + 3 :]) for column in combined]
     return Modes(
-        tuple(Wrench(Vector(*column[springs : springs + 3]), Vector(*column[springs + 3 :])) for column in combined),
-        tuple(tuple(column[e] for column in combined) for e in range(springs)),
-        tuple(pivots),
-        tuple(tuple(row) for row in modes.shares),
-        tuple(modes.inverses),
-        modes.doubt,
+        wrenches=tuple(Wrench(Vector(*moment), Vector(*force)) for moment, force in halves),
+        loads=tuple(tuple(column[e] for column in combined) for e in range(springs)),
+        compliance=tuple(pivots),
+        mixing=tuple(tuple(row) for row in modes.shares),
+        inverses=tuple(modes.inverses),
+        doubt=modes.doubt,
     )
 
 

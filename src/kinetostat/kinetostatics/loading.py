@@ -1,9 +1,10 @@
-"""Loads at one pose: the displacement of the tool and the loads of legs, springs and joints; deflected shape; internal.
+"""Loads at one pose: how far they move the tool and the links, what legs, springs and joints carry, and internal loads.
 
-A wrench on the platform moves the tool, and to first order every joint and link. Internal loads are wrenches that legs
-exert on each other through the platform without any load on it: if a spring on their way deflects, elasticity decides
-how large they are; if everything is rigid, they are undecided, and no motion of the platform depends on them. Wrenches
-and twists are in base axes, at the point that each function names.
+A wrench on the platform moves the tool, and to first order every joint and link (`deflection`, `deflected_links`).
+Legs, springs and joints carry it (`leg_wrenches`, `spring_loads`, `joint_reactions`). Internal loads are wrenches that
+legs exert on each other through the platform without any load on it (`internal_loads`): if a spring on their way
+deflects, elasticity decides how large they are; if everything is rigid, they are undecided, and no motion of the
+platform depends on them. Wrenches and twists are in base axes, at the point that each function names.
 
 Source: theory (28) and (29); theory (31) and (32) for the shape; theory (9) and theory section 7 for internal loads.
 """
@@ -12,7 +13,6 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from math import isinf
 
 import numpy as np
 
@@ -57,10 +57,10 @@ def deflection(statics: Statics, load: Wrench) -> Twist:
         load: the wrench at the tool point, in the axes of the statics.
     """
     compliance, w = held_compliance(statics), load.components()
-    rows = [total([weighted(compliance.entry(i, j), w[j]) for j in range(SIZE)]) for i in range(SIZE)]
-    driven = [twist.components() for twist, s in statics.motions if s == INFINITE and work_on_free(load, twist)]
-    infinite = [any(twist[i] for twist in driven) for i in range(SIZE)]
-    components = [INFINITE if endless else row for row, endless in zip(rows, infinite, strict=True)]
+    amounts = [total([weighted(compliance.entry(i, j), w[j]) for j in range(SIZE)]) for i in range(SIZE)]
+    endless = [twist.components() for twist, s in statics.motions if s == INFINITE and work_on_free(load, twist)]
+    is_endless = [any(twist[i] for twist in endless) for i in range(SIZE)]
+    components = [INFINITE if flag else amount for amount, flag in zip(amounts, is_endless, strict=True)]
     return Twist(Vector(*components[:3]), Vector(*components[3:]))
 
 
@@ -85,17 +85,9 @@ def leg_wrenches(response: Response, load: Wrench) -> list[Wrench]:
     """
     carried = []
     for basis, shares in zip(response.statics.wrenches, response.statics.sharing, strict=True):
-        parts = [wrench * load.work(share) for wrench, share in zip(basis, shares, strict=True)]
-        carried.append(sum_of(parts))
+        amounts = [load.work(share) for share in shares]
+        carried.append(sum((wrench * amount for wrench, amount in zip(basis, amounts, strict=True)), NO_WRENCH))
     return carried
-
-
-def sum_of(wrenches: Sequence[Wrench]) -> Wrench:
-    """The sum of wrenches at one point."""
-    result = NO_WRENCH
-    for wrench in wrenches:
-        result = result + wrench
-    return result
 
 
 def joint_reactions(response: Response, load: Wrench) -> list[JointReaction]:
@@ -116,13 +108,13 @@ def joint_points(leg: Leg) -> list[tuple[str, Vector]]:
 
     The point of a slide is its carriage, or the end of the chain before it if the carriage is not known.
     """
-    named: dict[str, Vector] = {}
+    point_of_joint: dict[str, Vector] = {}
     end = next(iter(leg.path), ZERO)
     for element in leg.chain:
         for name, joint in _joints(element):
-            named.setdefault(name, joint.point or joint.carriage or end)
+            point_of_joint.setdefault(name, joint.point or joint.carriage or end)
         end = element.path[-1] if element.path else end
-    return list(named.items())
+    return list(point_of_joint.items())
 
 
 def _joints(element: Element) -> list[tuple[str, Joint]]:
@@ -150,7 +142,7 @@ class DeflectedLink:
     def point(self, share: float, factor: float) -> Vector:
         """The point at a share of the link once it has bent, displacements times `factor`; base frame, m.
 
-        Cubic between its ends, as a beam without load between them bends.
+        Displacements between the ends are cubic in the share, as those of a beam that is loaded at its ends only.
         """
         span, s = self.end - self.start, share
         slopes = [motion.rotational.cross(span) for motion in (self.start_motion, self.end_motion)]
@@ -181,22 +173,24 @@ class Deflection:
 def deflected_links(response: Response, load: Wrench) -> list[DeflectedLink]:
     """All links of a machine under a wrench at its tool point (N·m; N, base axes).
 
-    Springs give as they are loaded; passive joints and free springs move so that each leg's end follows the platform
+    Springs deflect as they are loaded; passive joints and free springs move so that each leg's end follows the platform
     (least squares of J_p q = t - J_e d, which has a solution because the statics hold).
     """
     platform = deflection(response.statics, load)
     loads = iter(spring_loads(response, load))
     links: list[DeflectedLink] = []
     for leg, screws in zip(response.configuration.legs, response.legs, strict=True):
-        pairs = [(twist, soft, next(loads)) for twist, soft in zip(screws.elastic, screws.compliance, strict=True)]
-        elastic = [None if isinf(soft) else twist * (load * soft) for twist, soft, load in pairs]
-        free = [twist for twist, soft, _ in pairs if isinf(soft)]
+        springs = [(twist, s, next(loads)) for twist, s in zip(screws.elastic, screws.compliance, strict=True)]
+        is_free = [s == INFINITE for _, s, _ in springs]
+        elastic = [twist * (spring_load * s) for twist, s, spring_load in springs if s != INFINITE]
+        free = [twist for twist, s, _ in springs if s == INFINITE]
         passive = [joint.twist(response.reference) for joint in leg.passive]
-        remaining = platform - _sum([twist for twist in elastic if twist is not None])
-        motions = _following([*passive, *free], remaining, float(response.configuration.length))
-        motions_of_free = iter(motions[len(passive) :])
-        motions_of_springs = [next(motions_of_free) if twist is None else twist for twist in elastic]
-        bodies = _bodies(leg, iter(motions[: len(passive)]), iter(motions_of_springs))
+        remainder = platform - sum(elastic, NO_MOTION)
+        following = _following([*passive, *free], remainder, float(response.configuration.length))
+        motions_of_joints, motions_of_free = iter(following[: len(passive)]), iter(following[len(passive) :])
+        motions_of_elastic = iter(elastic)
+        motions_of_springs = (next(motions_of_free if flag else motions_of_elastic) for flag in is_free)
+        bodies = _bodies(leg, motions_of_joints, motions_of_springs)
         links += leg_links(leg, partial(_twist_at, bodies, response.reference))
     return links
 
@@ -213,8 +207,8 @@ def leg_links(leg: Leg, motion_of: Callable[[int, Vector], Twist]) -> Iterator[D
     start_body = 0
     for number, element in enumerate(leg.chain):
         points = _points(element)
-        for k, point in enumerate(points):
-            body = number + (k > 0)  # the first point of an element belongs to the body before it
+        for place, point in enumerate(points):
+            body = number if place == 0 else number + 1  # the first point of an element belongs to the body before it
             if start is not None and (point - start).norm() > 0.0:
                 yield DeflectedLink(leg.name, start, point, motion_of(start_body, start), motion_of(body, point))
             start, start_body = point, body
@@ -222,14 +216,14 @@ def leg_links(leg: Leg, motion_of: Callable[[int, Vector], Twist]) -> Iterator[D
             start_body = number + 1
 
 
-def _following(passive: Sequence[Twist], motion: Twist, length: float) -> list[Twist]:
-    """Motions of the passive joints that add up to a motion, by least squares; `length` (m) makes rows comparable."""
-    if not passive:
+def _following(joints: Sequence[Twist], motion: Twist, length: float) -> list[Twist]:
+    """Motions of joints, by their unit twists, that add up to a motion; `length` (m) makes rows comparable."""
+    if not joints:
         return []
     scale = np.repeat([length, 1.0], 3)
-    columns = np.array([twist.components() for twist in passive], dtype=float).T * scale[:, None]
+    columns = np.array([twist.components() for twist in joints], dtype=float).T * scale[:, None]
     amounts = np.linalg.lstsq(columns, np.array(motion.components(), dtype=float) * scale, rcond=DEPENDENT_WRENCHES)[0]
-    return [twist * float(amount) for twist, amount in zip(passive, amounts, strict=True)]
+    return [twist * float(amount) for twist, amount in zip(joints, amounts, strict=True)]
 
 
 def _bodies(leg: Leg, of_joints: Iterator[Twist], of_springs: Iterator[Twist]) -> list[Twist]:
@@ -241,8 +235,8 @@ def _bodies(leg: Leg, of_joints: Iterator[Twist], of_springs: Iterator[Twist]) -
     """
     motions = [NO_MOTION]
     for element in leg.chain:
-        parts = [next(of_joints) for _ in element.freedoms] + [next(of_springs) for _ in element.springs]
-        motions.append(motions[-1] + _sum(parts))
+        own_motions = [next(of_joints) for _ in element.freedoms] + [next(of_springs) for _ in element.springs]
+        motions.append(motions[-1] + sum(own_motions, NO_MOTION))
     return motions
 
 
@@ -256,13 +250,6 @@ def _points(element: Element) -> tuple[Vector, ...]:
         point = element.mover.point
         return () if point is None else (point,)
     return element.path
-
-
-def _sum(twists: Sequence[Twist]) -> Twist:
-    result = NO_MOTION
-    for twist in twists:
-        result = result + twist
-    return result
 
 
 @dataclass(frozen=True)
@@ -305,15 +292,16 @@ def internal_loads(
     matrix = np.array(columns, dtype=float).T / np.repeat([length, 1.0], 3)[:, None]
     sizes = np.linalg.norm(matrix, axis=0)
     _, values, rows = np.linalg.svd(matrix / sizes)
-    internal = (rows[int((values > DEPENDENT_WRENCHES * values[0]).sum()) :] / sizes).T[: len(owners)]
-    _, elastic, modes = np.linalg.svd(_load_shares(balanced) @ internal)
-    decided = int((elastic > CLOSING_ROUND_OFF).sum())
+    rank = int((values > DEPENDENT_WRENCHES * values[0]).sum())
+    internal = (rows[rank:] / sizes).T[: len(owners)]  # a column for each; the guide, which stands last, has no leg
+    _, elastic_sizes, modes = np.linalg.svd(_load_shares(balanced) @ internal)
+    decided = int((elastic_sizes > CLOSING_ROUND_OFF).sum())
     undecided = internal @ modes[decided:].T
     return InternalLoads(
-        internal.shape[1],
-        internal.shape[1] - decided,
-        _involved_legs(names, owners, internal),
-        _involved_legs(names, owners, undecided),
+        degree=internal.shape[1],
+        undecided=internal.shape[1] - decided,
+        legs=_involved_legs(names, owners, internal),
+        undecided_legs=_involved_legs(names, owners, undecided),
     )
 
 

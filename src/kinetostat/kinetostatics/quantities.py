@@ -87,9 +87,8 @@ class MapQuantity:
     driven: str = ""
 
 
-def _entry(response: Response, matrix: str, i: int, j: int) -> Scalar:
-    symmetric: Symmetric6 = getattr(response, matrix)
-    return symmetric.entry(i, j)
+def _entry(response: Response, matrix_of: Callable[[Response], Symmetric6], i: int, j: int) -> Scalar:
+    return matrix_of(response).entry(i, j)
 
 
 def _compliance_unit(i: int, j: int) -> str:
@@ -107,18 +106,18 @@ def _symbol(letter: str, *index: str) -> str:
     return rf"${letter}_{{\mathrm{{{','.join(index)}}}}}$"
 
 
-def _entries(matrix: str, letter: str, unit: Callable[[int, int], str], better: Better) -> list[MapQuantity]:
+def _entry_quantities(matrix: str, letter: str, unit: Callable[[int, int], str], better: Better) -> list[MapQuantity]:
     entries = []
     for i, j in POSITIONS:
         names = (COMPONENTS[i],) if i == j else (COMPONENTS[i], COMPONENTS[j])
         # An entry that couples two components may have either sign: neither more nor less of it is better.
-        wanted, value = better if i == j else None, partial(_entry, matrix=matrix, i=i, j=j)
+        wanted, value = better if i == j else None, partial(_entry, matrix_of=attrgetter(matrix), i=i, j=j)
         name, symbol = "_".join([matrix, *names]), _symbol(letter, *names)
         entries.append(MapQuantity(name, unit(i, j), symbol, value, components=names, better=wanted))
     return entries
 
 
-def _free_stiffnesses() -> list[MapQuantity]:
+def _free_stiffness_quantities() -> list[MapQuantity]:
     entries = []
     for i, component in enumerate(COMPONENTS):
         name, symbol = f"free_stiffness_{component}", rf"$1/C_{{\mathrm{{{component}}}}}$"
@@ -127,7 +126,7 @@ def _free_stiffnesses() -> list[MapQuantity]:
     return entries
 
 
-def _extremes() -> list[MapQuantity]:
+def _extreme_quantities() -> list[MapQuantity]:
     blocks = (("translational", "N/m", "t", TRANSLATIONS), ("rotational", "N·m/rad", "r", ROTATIONS))
     entries = []
     for word, unit, letter, block in blocks:
@@ -137,33 +136,33 @@ def _extremes() -> list[MapQuantity]:
     return entries
 
 
-def _under_load(response: Response, what: str, row: int | None = None) -> Scalar:
-    """A number of the loaded state; NaN where it has not been computed."""
-    if response.loaded is None or what not in response.loaded:
-        return float("nan")
-    values = response.loaded[what]
-    return values if row is None else values[row]
+def _loaded_number(response: Response, name: str, row: int | None = None) -> Scalar:
+    """A number of the loaded state, or a row of it; NaN where it has not been computed."""
+    if response.loaded is None or name not in response.loaded:
+        return math.nan
+    number = response.loaded[name]
+    return number if row is None else number[row]
 
 
 def _displacement(response: Response, row: int) -> Scalar:
     """A displacement under load, without what round-off leaves where nothing moves."""
-    amount = _under_load(response, "displacement", row)
+    amount = _loaded_number(response, "displacement", row)
     return where(amount * amount < UNMOVED_TOOL * UNMOVED_TOOL, 0.0, amount)
 
 
 def _tangent_free(response: Response, row: int) -> Scalar:
-    return reciprocal(_under_load(response, "compliance", row))
+    return reciprocal(_loaded_number(response, "compliance", row))
 
 
 def _free_frequency(response: Response, row: int) -> Scalar:
     """A natural frequency with relaxed springs; NaN where it has not been computed."""
-    return float("nan") if response.frequencies is None else response.frequencies[row]
+    return math.nan if response.frequencies is None else response.frequencies[row]
 
 
-def _frequencies(prefix: str, loaded: str = "") -> list[MapQuantity]:
+def _frequency_quantities(prefix: str, loaded: str = "") -> list[MapQuantity]:
     entries = []
     for row in range(MODES):
-        value = partial(_under_load, what=loaded, row=row) if loaded else partial(_free_frequency, row=row)
+        value = partial(_loaded_number, name=loaded, row=row) if loaded else partial(_free_frequency, row=row)
         index = rf"\mathrm{{t}},{row + 1}" if loaded else str(row + 1)
         name, symbol = f"{prefix}_{row + 1}", f"$f_{{{index}}}$"
         entries.append(MapQuantity(name, "Hz", symbol, value, better="more", loaded=loaded, modal=True))
@@ -172,19 +171,19 @@ def _frequencies(prefix: str, loaded: str = "") -> list[MapQuantity]:
 
 def _least_real_part(response: Response) -> Scalar:
     """The least real part of the receptance across the cut; NaN where it has not been computed."""
-    return float("nan") if response.softest is None else response.softest
+    return math.nan if response.softest is None else response.softest
 
 
 def _stable_width(response: Response) -> Scalar:
     """The width of cut up to which every spindle speed is stable, theory (60); infinite where nothing rings."""
     if response.softest is None:
-        return float("nan")
+        return math.nan
     rings = response.softest < 0.0
     width = reciprocal(response.cutting_pressure) * (-0.5 / where(rings, response.softest, -1.0))
     return where(rings, width, math.inf)
 
 
-def _of_the_cut() -> list[MapQuantity]:
+def _cut_quantities() -> list[MapQuantity]:
     real, width = r"$\mathrm{min\,Re}\,H$", "stable width of cut"
     return [
         MapQuantity("least_real_receptance", "m/N", real, _least_real_part, better="more", modal=True, cut=True),
@@ -192,12 +191,12 @@ def _of_the_cut() -> list[MapQuantity]:
     ]
 
 
-def _of_cable(response: Response, name: str) -> Scalar:
+def _cable_number(response: Response, name: str) -> Scalar:
     """A number of cables; NaN where it has not been computed."""
-    return float("nan") if response.cables is None else response.cables[name]
+    return math.nan if response.cables is None else response.cables[name]
 
 
-def _of_cables() -> list[MapQuantity]:
+def _cable_quantities() -> list[MapQuantity]:
     rows: list[tuple[str, str, str, Better]] = [
         *((f"tension_{number}", "N", rf"$\tau_{{{number}}}$", None) for number in range(1, MOST_CABLES + 1)),
         ("least_tension", "N", "least tension", "more"),
@@ -207,12 +206,12 @@ def _of_cables() -> list[MapQuantity]:
         ("wrench_closure", "1", "wrench closure", "more"),
     ]
     return [
-        MapQuantity(name, unit, symbol, partial(_of_cable, name=name), better=better, needs=CABLES, cables=True)
+        MapQuantity(name, unit, symbol, partial(_cable_number, name=name), better=better, needs=CABLES, cables=True)
         for name, unit, symbol, better in rows
     ]
 
 
-def _of_actuators() -> list[MapQuantity]:
+def _actuator_quantities() -> list[MapQuantity]:
     entries = []
     for word, unit, sliding in (("force", "N", True), ("moment", "N·m", False)):
         name, value = f"actuator_{word}", partial(actuator_load, sliding=sliding)
@@ -289,7 +288,7 @@ NUMBERS_OF_DRIVES = {
 }
 
 
-def _of_drives() -> list[MapQuantity]:
+def _drive_quantities() -> list[MapQuantity]:
     """Numbers of drives along each component, and then in all directions of a block."""
     entries = []
     for word, kind in NUMBERS_OF_DRIVES.items():
@@ -307,7 +306,7 @@ def _of_drives() -> list[MapQuantity]:
     return entries
 
 
-def _of_reversal() -> list[MapQuantity]:
+def _reversal_quantities() -> list[MapQuantity]:
     """Lost motion of the tool where all drives reverse, by component."""
     entries = []
     for row, name in enumerate(COMPONENTS):
@@ -319,12 +318,12 @@ def _of_reversal() -> list[MapQuantity]:
     return entries
 
 
-def _of_loaded_state() -> list[MapQuantity]:
+def _loaded_quantities() -> list[MapQuantity]:
     entries = []
     for i, name in enumerate(COMPONENTS):
         shown, unit = rf"\mathrm{{{name}}}", "rad" if i in ROTATIONS else "m"
         motion = partial(_displacement, row=i)
-        tangent, free = partial(_under_load, what="stiffness", row=i), partial(_tangent_free, row=i)
+        tangent, free = partial(_loaded_number, name="stiffness", row=i), partial(_tangent_free, row=i)
         stiff = _stiffness_unit(i, i)
         rows: list[tuple[str, str, str, Callable[[Response], Scalar], Better, str]] = [
             ("displacement", unit, rf"$u_{{{shown}}}$", motion, None, "displacement"),
@@ -335,8 +334,8 @@ def _of_loaded_state() -> list[MapQuantity]:
             entries.append(
                 MapQuantity(f"{start}_{name}", label, symbol, value, components=(name,), better=better, loaded=loaded)
             )
-    entries += _frequencies("loaded_frequency", "frequency")
-    factor, slack, snapped = (partial(_under_load, what=what) for what in ("factor", "slack", "snapped"))
+    entries += _frequency_quantities("loaded_frequency", "frequency")
+    factor, slack, snapped = (partial(_loaded_number, name=name) for name in ("factor", "slack", "snapped"))
     return [
         *sorted(entries, key=lambda entry: entry.name.rpartition("_")[0]),
         MapQuantity("load_factor", "1", "load factor", factor, better="more", loaded="factor"),
@@ -348,23 +347,23 @@ def _of_loaded_state() -> list[MapQuantity]:
 QUANTITIES = {
     quantity.name: quantity
     for quantity in (
-        *_entries("compliance", "C", _compliance_unit, "less"),
-        *_entries("stiffness", "K", _stiffness_unit, "more"),
-        *_free_stiffnesses(),
+        *_entry_quantities("compliance", "C", _compliance_unit, "less"),
+        *_entry_quantities("stiffness", "K", _stiffness_unit, "more"),
+        *_free_stiffness_quantities(),
         MapQuantity("singularity_margin", "1", "singularity margin", attrgetter("singularity_margin"), better="more"),
         MapQuantity("mass", "kg", "moving mass", attrgetter("mass"), better="less"),
         MapQuantity("aspect", "1", "aspect", aspect, whole=True),
-        *_extremes(),
+        *_extreme_quantities(),
         MapQuantity("frobenius_condition", "1", "condition of K (Frobenius)", frobenius_condition, better="less"),
         MapQuantity("shortest_leg", "m", "shortest leg", shortest_leg, needs=LIMITS["shortest_leg"].needs),
         MapQuantity("longest_leg", "m", "longest leg", longest_leg, better="less", needs=LIMITS["longest_leg"].needs),
-        *_of_actuators(),
-        *_of_drives(),
-        *_of_reversal(),
-        *_frequencies("frequency"),
-        *_of_the_cut(),
-        *_of_loaded_state(),
-        *_of_cables(),
+        *_actuator_quantities(),
+        *_drive_quantities(),
+        *_reversal_quantities(),
+        *_frequency_quantities("frequency"),
+        *_cut_quantities(),
+        *_loaded_quantities(),
+        *_cable_quantities(),
     )
 }
 """Every quantity by name: compliance_rx, compliance_rx_z, ..., stiffness_x, ..., singularity_margin, ..."""

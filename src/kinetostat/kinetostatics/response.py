@@ -190,7 +190,8 @@ def compliance_at(machine: Machine, configuration: Configuration) -> Symmetric6:
         machine: the machine whose tool counts.
         configuration: the place of its legs, which need not follow from its own numbers.
     """
-    return compliance_matrix(_statics(machine, configuration)[3])
+    *_, statics = _statics(machine, configuration)
+    return compliance_matrix(statics)
 
 
 def _statics(

@@ -86,7 +86,7 @@ def lost_motion_of_joints(machine: "RigidMachine", response: Response) -> list[S
 
 def _compliances(response: Response) -> list[Scalar]:
     """Return the compliance of each spring; of a drive that of its loop at rest."""
-    of_loops = {drive.spring.name: drive.softness for drive in response.drives}
+    of_loops = {drive.spring.name: drive.compliance for drive in response.drives}
     names = [spring.name for leg in response.configuration.legs for spring in leg.springs]
     return [of_loops.get(name, of_spring) for name, of_spring in zip(names, response.statics.compliance, strict=True)]
 

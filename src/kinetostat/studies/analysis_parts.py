@@ -27,7 +27,7 @@ from kinetostat.kinetostatics.eigenscrews import (
 )
 from kinetostat.kinetostatics.indices import (
     SPATIAL,
-    Principal,
+    PrincipalCompliances,
     PrincipalStiffness,
     free_stiffnesses,
     guided_stiffnesses,
@@ -58,7 +58,7 @@ class Indices(ImmutableAnswer):
         eigenscrews: eigenscrews of K, or of C if K is not finite; empty for a planar machine.
     """
 
-    principal_compliances: dict[str, Principal] | None
+    principal_compliances: dict[str, PrincipalCompliances] | None
     free: dict[str, PrincipalStiffness] | None
     guided: dict[str, PrincipalStiffness] | None
     stiffness_condition: float

@@ -29,7 +29,7 @@ from kinetostat.equilibrium.state import AnswerInState, MachineState, state_of, 
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.limits import limit_use
 from kinetostat.kinematics.status import REGULAR, Status
-from kinetostat.kinetostatics.drive_limits import driven_springs, play
+from kinetostat.kinetostatics.drive_limits import driven_springs, unseen_backlash
 from kinetostat.machine.actuators import name_of
 from kinetostat.machine.loading import changed
 from kinetostat.machine.machine import Machine
@@ -342,7 +342,8 @@ def _gaps(model: ErrorModel, machine: Machine) -> dict[tuple[str, str], float]:
     """Distance between the ends of each clearance with a tolerance, and of the backlash of each drive, m or rad."""
     gaps: dict[tuple[str, str], float] = {}
     plays = {
-        name_of(spring): float(play(machine, spring)) for spring in driven_springs(state_of(machine).configuration)
+        name_of(spring): float(unseen_backlash(machine, spring))
+        for spring in driven_springs(state_of(machine).configuration)
     }
     for error in model.errors:
         if error.group == "zeros":

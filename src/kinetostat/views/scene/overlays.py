@@ -13,7 +13,7 @@ from kinetostat.algebra.screw import COMPONENTS, Twist, Wrench
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Rotation, Vector, rotation_along
 from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
-from kinetostat.kinetostatics.indices import Principal
+from kinetostat.kinetostatics.indices import PrincipalCompliances
 from kinetostat.kinetostatics.loading import Deflection, deflected_links, deflection
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Configuration, Machine
@@ -60,7 +60,7 @@ GHOST_POINTS = 12
 """Pieces of a deflected link: enough for a beam that bends both ways."""
 
 
-def ellipsoid_solids(block: str, principal: Principal, point: Vector, sizes: Proportions) -> list[Solid]:
+def ellipsoid_solids(block: str, principal: PrincipalCompliances, point: Vector, sizes: Proportions) -> list[Solid]:
     """Draw the compliance ellipsoid of a block at the tool point; of a planar machine, the part that exists.
 
     Translation is a body, rotation a cage of three rings, so that both are seen where they overlap.
@@ -102,7 +102,7 @@ def _ellipse(i: int, j: int, lengths: Sequence[float], wire: float) -> Swept:
     return Swept(tuple(path), wire, closed=True)
 
 
-def softest_solids(principal: Mapping[str, Principal], point: Vector, sizes: Proportions) -> list[Solid]:
+def softest_solids(principal: Mapping[str, PrincipalCompliances], point: Vector, sizes: Proportions) -> list[Solid]:
     """Draw arrows along and about the softest directions of translation and rotation."""
     solids = []
     for block, axes in principal.items():
@@ -237,7 +237,10 @@ def exaggeration_of(machine: Machine, configuration: Configuration, motions: Def
 
 
 def compliance_overlays(
-    machine: Machine, configuration: Configuration, sizes: Proportions, principal: Mapping[str, Principal] | None
+    machine: Machine,
+    configuration: Configuration,
+    sizes: Proportions,
+    principal: Mapping[str, PrincipalCompliances] | None,
 ) -> list[Solid]:
     """Draw ellipsoids and softest directions at the tool point; nothing where a direction is free.
 
