@@ -10,6 +10,7 @@ import kinetostat
 from kinetostat import InputError, drives, evaluate, load, modes, save, servo
 from kinetostat.equilibrium.state import state_of
 from kinetostat.exchange.leg_by_leg import document_of
+from kinetostat.machine.actuators import MOST_DRIVES
 from kinetostat.machine.loading import build
 from kinetostat.vibration.servo import ServoLoop
 from kinetostat.views.servo import SERVO, servo_figures
@@ -240,6 +241,14 @@ def test_two_drives_of_a_leg_have_tables_by_their_names_and_what_cannot_move_is_
 def test_a_mistake_in_the_table_of_a_drive_is_named(setting, message):
     with pytest.raises(InputError, match=message):
         hexapod(setting)
+
+
+def test_more_drives_with_tables_than_any_machine_has_are_refused():
+    """A drive with both tables counts once, and 65 drives with one of them are too many."""
+    own = {f"leg {i}": {"lead": "5 mm"} for i in range(MOST_DRIVES + 1)}
+    document = document_of(hexapod()) | {"drives": own}
+    with pytest.raises(InputError, match=f"{MOST_DRIVES + 1} single drives; at most {MOST_DRIVES}"):
+        build(document)
 
 
 def lost_by_joints(machine, moment):

@@ -1,7 +1,8 @@
-"""Actuators: the coordinates at which they stand, and the numbers of the drives behind them.
+"""Actuators: the coordinates at which they stand, and then the numbers of the drives behind them.
 
-An actuated slide between two passive joints has the length of its leg. All other actuators of machines written leg by
-leg count from the home pose; those of families, which have no home pose, have a position or an angle in the base frame.
+Coordinates are measured on a placed machine. An actuated slide between two passive joints has the length of its leg.
+All other actuators of machines written leg by leg count from the home pose; those of families, which have no home pose,
+have a position or an angle in the base frame.
 
 The tables [drives] and [servo] hold for all drives. A file may have a table [drives.NAME] or [servo.NAME] for a leg or
 a drive, with the fields in which it differs; a machine with such tables gets a family of its own, whose files have
@@ -11,8 +12,8 @@ them. Nothing is solved here. Points and axes are in the base frame.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from enum import StrEnum
 from functools import lru_cache
-from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -21,27 +22,36 @@ from kinetostat.algebra.scalar import Scalar, arctan2, is_zero, reciprocal
 from kinetostat.algebra.vector import Vector
 from kinetostat.frozen import dataclass
 from kinetostat.machine.column import plain
-from kinetostat.machine.common_tables import COMMON_TABLES
+from kinetostat.machine.common_tables import COMMON_TABLES, Drives
 from kinetostat.machine.leg import Joint, Leg, PartName, Spring, Turn
-from kinetostat.machine.links import rods
-from kinetostat.machine.machine import Chains, Configuration, Family, Machine
+from kinetostat.machine.links import Rod, rods
+from kinetostat.machine.machine import Chains, Configuration, DriveTable, Family, Machine
 from kinetostat.machine.parameters import KEPT_FAMILIES, AnyMachine, with_values
 from kinetostat.spec.document import Document, toml_key
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.fields import quantities
-from kinetostat.tolerances import NO_LINK, PARALLEL_AXES
+from kinetostat.tolerances import NO_LINK, PARALLEL_IN_FILE
 
 TRIAL_MOTION = 1e-4
 """Motion of an actuator, m or rad, that shows its sense: far above round-off, too small to pass a turning point."""
-LENGTH, POSITION = "length of the leg", "position along its axis from the base origin"
-HEIGHT = "position along its rail from the foot of that"
-ELEVATION, BEARING = "angle of the crank above the x-y plane", "angle of the crank from x"
-TRAVEL, TURN = "travel from the home pose", "turn from the home pose"
-"""Meanings of the coordinates of actuators, for people."""
 TABLES_OF_DRIVES = ("drives", "servo")
 """Tables of which a drive may have its own."""
 MOST_DRIVES = 64
 """Drives that may have tables of their own: more than any machine has, so that more are a mistake."""
+
+
+class Meaning(StrEnum):
+    """Meaning of an actuator's coordinate, for people."""
+
+    LENGTH = "length of the leg"
+    POSITION = "position along its axis from the base origin"
+    HEIGHT = "position along its rail from the foot of that"
+    ELEVATION = "angle of the crank above the x-y plane"
+    BEARING = "angle of the crank from x"
+    TRAVEL = "travel from the home pose"
+    ROTATION = "turn from the home pose"
+
+    __repr__ = str.__repr__  # so that an answer prints the words alone
 
 
 @dataclass(frozen=True)
@@ -51,14 +61,14 @@ class Actuator:
     Attributes:
         name: the name of the joint that it drives, e.g. "leg 1 actuator".
         leg: the name of its leg.
-        meaning: the meaning of its coordinate, in words.
+        meaning: the meaning of its coordinate.
         coordinate: m, or rad.
         slides: whether it is linear.
     """
 
     name: str
     leg: str
-    meaning: str
+    meaning: Meaning
     coordinate: Scalar
     slides: bool
 
@@ -74,13 +84,14 @@ class Actuator:
 
 
 def actuators_of(configuration: Configuration) -> list[Actuator]:
-    """Measure the actuators of a placed machine of a family, over floats or columns.
+    """Measure the actuators of a placed machine of a family.
 
     A rotary actuator has the angle of its crank above the x-y plane, from the horizontal direction that points away
     from the z axis (towards +x or +y where none does); about a vertical axis, the angle from x, counter-clockwise.
 
     Args:
-        configuration: the configuration of a machine in closed form.
+        configuration: the configuration of a machine in closed form, over floats or columns; over traced scalars if
+            its rotary actuators turn about the vertical by form.
     """
     lengths = {rod.leg: rod.length for rod in rods(configuration.legs) if rod.telescopic}
     actuators, end = [], configuration.platform.translation
@@ -90,11 +101,9 @@ def actuators_of(configuration: Configuration) -> list[Actuator]:
                 continue
             slides = spring.joint.point is None
             if slides and leg.name in lengths:
-                meaning, coordinate = LENGTH, lengths[leg.name]
+                meaning, coordinate = Meaning.LENGTH, lengths[leg.name]
             elif slides:
-                point, foot = _next_point(leg, place, end), spring.joint.foot
-                meaning, reached = (POSITION, point) if foot is None else (HEIGHT, point - foot)
-                coordinate = reached.dot(spring.joint.axis)
+                meaning, coordinate = _slide_position(spring.joint, _next_point(leg, place, end))
             else:
                 meaning, coordinate = _crank_angle(spring.joint, leg, place, end)
             actuators.append(
@@ -142,22 +151,29 @@ def _coincide(first: Vector, second: Vector) -> bool:
     return bool((np.asarray(span.norm(), dtype=float) <= NO_LINK).all())
 
 
-def _crank_angle(joint: Joint, leg: Leg, place: int, end: Vector) -> tuple[str, Scalar]:
+def _slide_position(joint: Joint, carriage: Vector) -> tuple[Meaning, Scalar]:
+    """The meaning and the value, m, of the coordinate of a driven slide, from the point that it carries."""
+    if joint.foot is None:
+        return Meaning.POSITION, carriage.dot(joint.axis)
+    return Meaning.HEIGHT, (carriage - joint.foot).dot(joint.axis)
+
+
+def _crank_angle(joint: Joint, leg: Leg, place: int, end: Vector) -> tuple[Meaning, Scalar]:
     """The meaning and the value, rad, of the coordinate of a driven revolute, as `actuators_of` describes it."""
     centre, axis = joint.point, joint.axis
     if centre is None:
         raise ValueError("a slide has no crank")
     crank = _next_point(leg, place, end, centre) - centre
-    if np.abs(np.asarray(axis.z, dtype=float)).max() > 1.0 - PARALLEL_AXES:
-        return BEARING, arctan2(crank.y, crank.x)
-    level = np.hypot(axis.x, axis.y)
+    level = np.hypot(np.asarray(axis.x, dtype=float), np.asarray(axis.y, dtype=float))
+    if level.min() <= PARALLEL_IN_FILE:  # the axis is vertical, so that no crank rises
+        return Meaning.BEARING, arctan2(crank.y, crank.x)
     outward = Vector(axis.y / level, -axis.x / level, 0.0)
     radius = np.asarray(outward.dot(centre), dtype=float)
     # Where neither horizontal direction points away from the z axis, the one towards +x (or +y) is taken.
     towards_x = np.where(np.abs(outward.x) > NO_LINK, outward.x, outward.y)
     outward = outward * np.where(np.where(np.abs(radius) < NO_LINK, towards_x, radius) < 0.0, -1.0, 1.0)
     upward = Vector(-axis.x * axis.z / level, -axis.y * axis.z / level, level)
-    return ELEVATION, arctan2(crank.dot(upward), crank.dot(outward))
+    return Meaning.ELEVATION, arctan2(crank.dot(upward), crank.dot(outward))
 
 
 @dataclass(frozen=True)
@@ -172,7 +188,7 @@ class JointActuator:
 
     name: str
     leg: str
-    meaning: str
+    meaning: Meaning
     slides: bool
     place: int
     offset: float
@@ -197,37 +213,39 @@ def joint_actuators(chains: Chains, names: Sequence[str]) -> list[JointActuator]
         chains: the legs of the machine at the home pose; floats.
         names: the names of the legs.
     """
-    actuators, place = [], 0
+    actuators: list[JointActuator] = []
+    first = 0
     for name, steps in zip(names, chains.legs, strict=True):
-        leg = Leg(name, tuple(step.element for step in steps))
-        rod = next((rod for rod in rods([leg]) if rod.telescopic), None)
-        for step in steps:
-            if not step.moves:
-                continue
-            if isinstance(step.element, Spring) and step.element.actuated:
-                slides = step.element.joint.point is None
-                offset, sign, meaning = 0.0, 1.0, TRAVEL if slides else TURN
-                along_rod = _cosine(rod.span, step.element.joint.axis) if slides and rod is not None else 0.0
-                if rod is not None and abs(along_rod) > 1.0 - PARALLEL_AXES:
-                    offset, sign, meaning = float(rod.length), float(np.sign(along_rod)), LENGTH
-                actuators.append(
-                    JointActuator(
-                        name=name_of(step.element),
-                        leg=name,
-                        meaning=meaning,
-                        slides=slides,
-                        place=place,
-                        offset=offset,
-                        sign=sign,
-                    )
-                )
-            place += 1
+        rod = next(iter(rods([Leg(name, tuple(step.element for step in steps))])), None)
+        moving = [step.element for step in steps if step.moves]
+        actuators += [
+            _joint_actuator(element, name, place, rod if rod is not None and rod.telescopic else None)
+            for place, element in enumerate(moving, first)
+            if isinstance(element, Spring) and element.actuated
+        ]
+        first += len(moving)
     return actuators
 
 
-def _cosine(span: Vector, axis: Vector) -> float:
-    """The cosine between a span and a unit vector."""
-    return float(span.dot(axis) / span.norm())
+def _joint_actuator(spring: Spring, leg: str, place: int, telescope: Rod | None) -> JointActuator:
+    """The actuator of a sprung joint at the home pose.
+
+    Args:
+        spring: the spring of the actuator.
+        leg: the name of its leg.
+        place: the place of its coordinate among all joint coordinates.
+        telescope: the straight part of its leg, if a driven slide sets its length.
+    """
+    slides = spring.joint.point is None
+    meaning, offset, sign = Meaning.TRAVEL if slides else Meaning.ROTATION, 0.0, 1.0
+    if slides and telescope is not None:
+        along = telescope.span * (1.0 / telescope.length)
+        if spring.joint.axis.cross(along).norm() <= PARALLEL_IN_FILE:
+            meaning, offset = Meaning.LENGTH, float(telescope.length)
+            sign = math.copysign(1.0, spring.joint.axis.dot(along))
+    return JointActuator(
+        name=name_of(spring), leg=leg, meaning=meaning, slides=slides, place=place, offset=offset, sign=sign
+    )
 
 
 def family_with_own_drives(family: Family, document: Document, origin: str) -> Family:
@@ -250,16 +268,17 @@ def family_with_own_drives(family: Family, document: Document, origin: str) -> F
                 continue  # a field of the table itself, known or not
             for field in fields:
                 choice(field, known, f'"{origin}": the field of {table}.{toml_key(name)}')
-            tables.append((f"{table}.{name}", tuple(field for field in known if field in fields)))
-    if len(tables) > len(TABLES_OF_DRIVES) * MOST_DRIVES:
+            tables.append(DriveTable(f"{table}.{name}", tuple(field for field in known if field in fields)))
+    drives = {table.drive for table in tables}
+    if len(drives) > MOST_DRIVES:
         raise InputError(
-            f'"{origin}" has {len(tables)} tables of single drives; at most {MOST_DRIVES} drives have any.'
+            f'"{origin}" has tables for {len(drives)} single drives; at most {MOST_DRIVES} drives may have any.'
         )
     return _with_own_drives(family, tuple(tables)) if tables else family
 
 
 @lru_cache(KEPT_FAMILIES)
-def _with_own_drives(family: Family, tables: tuple[tuple[str, tuple[str, ...]], ...]) -> Family:
+def _with_own_drives(family: Family, tables: tuple[DriveTable, ...]) -> Family:
     return replace(family, own_drives=tables, recipe=(_with_own_drives, (family, tables)))
 
 
@@ -279,28 +298,29 @@ def check_own_drives(family: Family, legs: Sequence[Leg], origin: str) -> None:
     names = dict.fromkeys(
         name for leg in legs for spring in leg.springs if spring.actuated for name in (leg.name, name_of(spring))
     )
-    for path, _ in family.own_drives:
-        table, _, name = path.partition(".")
-        choice(name, names, f'"{origin}": the leg or drive of [{table}.{toml_key(name)}]')
+    for table in family.own_drives:
+        choice(table.drive, names, f'"{origin}": the leg or drive of [{table.of_all}.{toml_key(table.drive)}]')
 
 
 def numbers_of_drive(machine: Machine, table: str, spring: Spring) -> Any:
     """A table of `TABLES_OF_DRIVES` as a drive has it: its own fields in the place of those of all drives.
 
-    A table of the drive comes before that of its leg.
+    A number in a table of the drive itself counts more than one in a table of its leg.
 
     Args:
         machine: the machine with its tables.
         table: "drives" or "servo".
         spring: the spring of the actuator.
+
+    Returns:
+        `common_tables.Drives` or `ServoGains`.
     """
     numbers, part = machine.tables[table], spring.part_name
-    tables = [path for path, _ in machine.family.own_drives if path.startswith(f"{table}.")]
-    names = [path.removeprefix(f"{table}.") for path in tables]
-    of_leg = [part.leg == name if isinstance(part, PartName) else part.startswith(f"{name} ") for name in names]
-    of_drive = [name == name_of(spring) for name in names]
-    for path in (*compress(tables, of_leg), *compress(tables, of_drive)):
-        numbers = replace(numbers, **vars(machine.tables[path]))
+    own = [own_table for own_table in machine.family.own_drives if own_table.of_all == table]
+    of_leg = [t for t in own if (part.leg == t.drive if isinstance(part, PartName) else part.startswith(f"{t.drive} "))]
+    of_drive = [t for t in own if t.drive == name_of(spring)]
+    for own_table in (*of_leg, *of_drive):  # the later one holds
+        numbers = replace(numbers, **vars(machine.tables[own_table.path]))
     return numbers
 
 
@@ -311,8 +331,12 @@ def with_every_drive(machine: AnyMachine, changes: Mapping[str, float]) -> AnyMa
         machine: a machine.
         changes: new values by path, such as "drives.lead", SI.
     """
-    shared_paths = {f"{path}.{field}": f"{path.partition('.')[0]}.{field}" for path, field in _own_fields(machine)}
-    single = {path: changes[shared] for path, shared in shared_paths.items() if shared in changes}
+    single = {
+        f"{table.path}.{field}": changes[shared]
+        for table in machine.family.own_drives
+        for field in table.fields
+        if (shared := f"{table.of_all}.{field}") in changes
+    }
     return with_values(machine, {**changes, **single})
 
 
@@ -323,17 +347,12 @@ def values_of_drives(machine: Machine, path: str) -> list[Any]:
         machine: a machine.
         path: the path of the field, such as "drives.lead".
     """
-    table, _, field = path.partition(".")
-    single = [path for path, own_field in _own_fields(machine) if own_field == field and path.startswith(f"{table}.")]
-    return [getattr(machine.tables[name], field) for name in (table, *single)]
+    of_all, _, field = path.partition(".")
+    own = [table.path for table in machine.family.own_drives if table.of_all == of_all and field in table.fields]
+    return [getattr(machine.tables[name], field) for name in (of_all, *own)]
 
 
-def _own_fields(machine: AnyMachine) -> list[tuple[str, str]]:
-    """Each field in a table of a single drive: the path of the table, and the name of the field."""
-    return [(path, field) for path, fields in machine.family.own_drives for field in fields]
-
-
-def rotor_turns(spring: Spring, drives: Any) -> Scalar:
+def rotor_turns(spring: Spring, drives: Drives) -> Scalar:
     """Radians by which the rotor of an actuator turns per metre or radian of the actuator; 0.0 if nothing says it.
 
     Args:

@@ -7,7 +7,7 @@ a file is; nothing here solves. Points and axes are in the base frame.
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.algebra.screw import COMPONENTS, Wrench
@@ -182,6 +182,28 @@ class Chains:
         return sum(step.moves for steps in self.legs for step in steps)
 
 
+class DriveTable(NamedTuple):
+    """A table that a single drive has in machine files, beside those of all drives (`machine.actuators`).
+
+    Attributes:
+        path: the path of the table, such as "servo.leg 1".
+        fields: names of the fields that are written there.
+    """
+
+    path: str
+    fields: tuple[str, ...]
+
+    @property
+    def of_all(self) -> str:
+        """The table of all drives with the same fields: "drives" or "servo"."""
+        return self.path.partition(".")[0]
+
+    @property
+    def drive(self) -> str:
+        """The name of the drive, or of the leg whose drives are meant."""
+        return self.path.partition(".")[2]
+
+
 @dataclass(frozen=True, eq=False)
 class Family:
     """A kind of machine: what people must write about one, and its kinematics.
@@ -198,8 +220,7 @@ class Family:
         links: the links with a mass, of a family in closed form.
         members: gives all links that can move of a machine written leg by leg, from its tables.
         loads: names of the loads at other points of the platform that its files have, see `named_loads`.
-        own_drives: paths of the tables that single drives have of their own ("servo.leg 1"), each with the fields that
-            are written there, see `machine.actuators`.
+        own_drives: the tables that single drives have in its files.
         recipe: the recipe of a family that is made while the program runs, a function and its arguments that make it
             again elsewhere; other families are pickled by name.
     """
@@ -214,7 +235,7 @@ class Family:
     links: tuple[LinkKind, ...] = ()
     members: Callable[..., list[Member]] | None = None
     loads: tuple[str, ...] = ()
-    own_drives: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    own_drives: tuple[DriveTable, ...] = ()
     recipe: tuple[Callable[..., "Family"], tuple[Any, ...]] | None = None
 
     def __post_init__(self) -> None:
@@ -235,7 +256,7 @@ class Family:
     def every_table(self) -> dict[str, type]:
         """Its own tables and the common ones."""
         named = {f"load.{name}": NamedLoad for name in self.loads}
-        single = {path: table_of_one_drive(path, fields) for path, fields in self.own_drives}
+        single = {table.path: table_of_one_drive(*table) for table in self.own_drives}
         return FixedDict({**self.tables, **link_tables(self.links), **COMMON_TABLES, **single, **named})
 
 
