@@ -245,8 +245,8 @@ def test_a_mistake_in_the_table_of_a_drive_is_named(setting, message):
 
 def test_more_drives_with_tables_than_any_machine_has_are_refused():
     """A drive with both tables counts once, and 65 drives with one of them are too many."""
-    own = {f"leg {i}": {"lead": "5 mm"} for i in range(MOST_DRIVES + 1)}
-    document = document_of(hexapod()) | {"drives": own}
+    tables = {f"leg {i}": {"lead": "5 mm"} for i in range(MOST_DRIVES + 1)}
+    document = document_of(hexapod()) | {"drives": tables}
     with pytest.raises(InputError, match=f"{MOST_DRIVES + 1} single drives; at most {MOST_DRIVES}"):
         build(document)
 

@@ -127,8 +127,8 @@ def _changed_entries(machine: Machine, name: str) -> Document:
     """Return the entries of a common table that are not the usual ones, and those of single drives."""
     usual = vars(COMMON_TABLES[name]())
     entries = {field: value for field, value in vars(machine.tables[name]).items() if value != usual[field]}
-    own = [table for table in machine.family.own_drives if table.of_all == name]
-    return entries | {table.drive: dict(vars(machine.tables[table.path])) for table in own}
+    single = [table for table in machine.family.own_drives if table.of_all == name]
+    return entries | {table.drive: dict(vars(machine.tables[table.path])) for table in single}
 
 
 def _limits(machine: Machine, turn: Rotation, built: Configuration | None) -> dict[str, float]:

@@ -315,13 +315,18 @@ def numbers_of_drive(machine: Machine, table: str, spring: Spring) -> Any:
     Returns:
         `common_tables.Drives` or `ServoGains`.
     """
-    numbers, part = machine.tables[table], spring.part_name
-    own = [own_table for own_table in machine.family.own_drives if own_table.of_all == table]
-    of_leg = [t for t in own if (part.leg == t.drive if isinstance(part, PartName) else part.startswith(f"{t.drive} "))]
-    of_drive = [t for t in own if t.drive == name_of(spring)]
-    for own_table in (*of_leg, *of_drive):  # the later one holds
-        numbers = replace(numbers, **vars(machine.tables[own_table.path]))
+    single = [drive_table for drive_table in machine.family.own_drives if drive_table.of_all == table]
+    of_leg = [drive_table for drive_table in single if _is_of_leg(spring.part_name, drive_table.drive)]
+    of_drive = [drive_table for drive_table in single if drive_table.drive == name_of(spring)]
+    numbers = machine.tables[table]
+    for drive_table in (*of_leg, *of_drive):  # the later one holds
+        numbers = replace(numbers, **vars(machine.tables[drive_table.path]))
     return numbers
+
+
+def _is_of_leg(part: str, leg: str) -> bool:
+    """Whether a part belongs to a leg: it knows its leg, or else its name begins with that of the leg."""
+    return part.leg == leg if isinstance(part, PartName) else part.startswith(f"{leg} ")
 
 
 def with_every_drive(machine: AnyMachine, changes: Mapping[str, float]) -> AnyMachine:
@@ -348,8 +353,8 @@ def values_of_drives(machine: Machine, path: str) -> list[Any]:
         path: the path of the field, such as "drives.lead".
     """
     of_all, _, field = path.partition(".")
-    own = [table.path for table in machine.family.own_drives if table.of_all == of_all and field in table.fields]
-    return [getattr(machine.tables[name], field) for name in (of_all, *own)]
+    single = [table.path for table in machine.family.own_drives if table.of_all == of_all and field in table.fields]
+    return [getattr(machine.tables[path], field) for path in (of_all, *single)]
 
 
 def rotor_turns(spring: Spring, drives: Drives) -> Scalar:
