@@ -100,7 +100,7 @@ def test_the_command_writes_tables_figures_and_one_page_that_stands_alone(tmp_pa
 @pytest.mark.reports
 def test_a_wrong_model_is_found_out(monkeypatch, tmp_path, capsys):
     wrong = (
-        printed_numbers.TABLE_4[0].__class__("1000", "1001 N*m/rad", printed_numbers.TABLE_4[0].values),
+        printed_numbers.TABLE_4[0].__class__("1", "1001 N*m/rad", printed_numbers.TABLE_4[0].values),
         *printed_numbers.TABLE_4[1:],
     )
     monkeypatch.setattr(printed_numbers, "TABLE_4", wrong)

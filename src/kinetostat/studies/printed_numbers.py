@@ -22,6 +22,7 @@ CITATION = (
     "(2002)"
 )
 MACHINE = "zhang-gosselin-4dof"
+"""Name of the paper's machine among those that are bundled."""
 ACTUATOR_STIFFNESS = 1000.0
 """K_actuator, N/m, in every table."""
 
@@ -31,12 +32,12 @@ class PrintedRow:
     """A row of Table III or IV: the six diagonal entries in the order rx ry rz x y z.
 
     Attributes:
-        label: what the paper prints in the column K_passive.
+        ratio: K_passive over K_actuator as the paper prints it; 0 where it prints "rigid".
         setting: the value of both stiffness.passive_links that belongs to the numbers.
         values: the printed numbers, digit for digit.
     """
 
-    label: str
+    ratio: str
     setting: str
     values: tuple[str, ...]
 
@@ -50,22 +51,24 @@ class Erratum:
 
 
 TABLE_3 = (
-    PrintedRow("1000", "1e3 N*m/rad", ("0.52371", "1.41939", "1.5e-3", "0.915208", "5.78e-4", "0.0111974")),
-    PrintedRow("10^2 Ka", "1e5 N*m/rad", ("0.51707", "1.40514", "1.5e-5", "0.909087", "5.78e-6", "0.0111429")),
-    PrintedRow("10^4 Ka", "1e7 N*m/rad", ("0.516404", "1.4046", "1.5e-7", "0.908726", "5.78e-8", "0.0111393")),
-    PrintedRow("10^6 Ka", "1e10 N*m/rad", ("0.516397", "1.40459", "1.5e-10", "0.908722", "5.78e-11", "0.0111393")),
-    PrintedRow("rigid", "rigid", ("0.516397", "1.40459", "0.0", "0.908722", "0.0", "0.0111393")),
+    PrintedRow("1", "1e3 N*m/rad", ("0.52371", "1.41939", "1.5e-3", "0.915208", "5.78e-4", "0.0111974")),
+    PrintedRow("1e2", "1e5 N*m/rad", ("0.51707", "1.40514", "1.5e-5", "0.909087", "5.78e-6", "0.0111429")),
+    PrintedRow("1e4", "1e7 N*m/rad", ("0.516404", "1.4046", "1.5e-7", "0.908726", "5.78e-8", "0.0111393")),
+    PrintedRow("1e6", "1e10 N*m/rad", ("0.516397", "1.40459", "1.5e-10", "0.908722", "5.78e-11", "0.0111393")),
+    PrintedRow("0", "rigid", ("0.516397", "1.40459", "0.0", "0.908722", "0.0", "0.0111393")),
 )
 """Diagonal of C, rad/(N·m) and m/N."""
 
 TABLE_4 = (
-    PrintedRow("1000", "1e3 N*m/rad", ("8.50551", "26.21", "743.98", "70.4587", "2223.51", "3628.32")),
-    PrintedRow("10^4 Ka", "1e7 N*m/rad", ("8.50551", "26.21", "7.40741e6", "70.4587", "1.92e7", "3628.32")),
-    PrintedRow("10^6 Ka", "1e9 N*m/rad", ("8.50551", "26.21", "7.40741e8", "70.4587", "1.92e9", "3628.32")),
-    PrintedRow("10^7 Ka", "1e10 N*m/rad", ("8.50551", "26.21", "7.40741e9", "70.4587", "1.92e10", "3628.32")),
+    PrintedRow("1", "1e3 N*m/rad", ("8.50551", "26.21", "743.98", "70.4587", "2223.51", "3628.32")),
+    PrintedRow("1e4", "1e7 N*m/rad", ("8.50551", "26.21", "7.40741e6", "70.4587", "1.92e7", "3628.32")),
+    PrintedRow("1e6", "1e9 N*m/rad", ("8.50551", "26.21", "7.40741e8", "70.4587", "1.92e9", "3628.32")),
+    PrintedRow("1e7", "1e10 N*m/rad", ("8.50551", "26.21", "7.40741e9", "70.4587", "1.92e10", "3628.32")),
 )
 """Diagonal of K, N·m/rad and N/m."""
 
+RATIO = "K_passive / Ka"
+"""The name of the first column of both tables among the components."""
 ONE_DIGIT = "one digit is wrong: the other rows of the table approach the rigid row in proportion to 1/K_passive"
 HALF_DIGIT_SLACK = Decimal("1.000001")
 """Factor on half a digit: a number on its edge is equal to print although a binary number lies a little beside it."""
@@ -74,7 +77,7 @@ ERRATA = {
     ("Table III, row 1", "ry"): Erratum("1.45939", ONE_DIGIT),
     ("Table III, row 1", "x"): Erratum("0.945208", ONE_DIGIT),
     ("Table III, row 1", "z"): Erratum("0.0114974", ONE_DIGIT),
-    ("Table III, row 4", "K_passive / Ka"): Erratum(
+    ("Table III, row 4", RATIO): Erratum(
         "1e7", "its two small numbers belong to 10^7 Ka: C_rz is 1.5 / K_passive in every row"
     ),
     ("Table IV, row 1", "y"): Erratum("2223.56", "eq. 37 of the paper itself gives 2223.56 here, one digit is wrong"),
@@ -123,7 +126,7 @@ OPTIMISED_DESIGN = (
 
 COMPLIANCE_UNITS = [QUANTITIES[name].unit for name in GROUPS["compliance"]]
 STIFFNESS_UNITS = [QUANTITIES[name].unit for name in GROUPS["stiffness"]]
-
+"""Units of the diagonals of C and K, component by component."""
 SYMBOLS = {"passive link 1": "k52", "passive link 2": "k54"}
 """The paper's names of our springs; all actuators are Ka."""
 
@@ -179,50 +182,51 @@ def rounds_to(computed: float, printed: str) -> bool:
     return abs(Decimal(computed) - digits) <= half * HALF_DIGIT_SLACK
 
 
-def at(*settings: str) -> Response:
-    """The paper's machine with some values changed."""
+def response_with(*settings: str) -> Response:
+    """The response of the paper's machine with some values changed, "path=value" each."""
     return respond(load(MACHINE, settings))
 
 
 def table_3() -> Iterator[PaperNumber]:
     """Compliance against the stiffness of the passive leg."""
     for i, row in enumerate(TABLE_3):
-        response = at(f"stiffness.passive_links={row.setting}")
+        response = response_with(f"stiffness.passive_links={row.setting}")
         place = f"Table III, row {i + 1}"
-        yield from _numbers(place, row.values, response.compliance.diagonal(), COMPLIANCE_UNITS)
-        if row.label == "10^6 Ka":
-            yield _label_of_row_4(place, row.values[2])
+        yield from _compared_row(place, row.values, response.compliance.diagonal(), COMPLIANCE_UNITS)
+        if (place, RATIO) in ERRATA:
+            yield _ratio_of_row(place, row)
 
 
-def _label_of_row_4(place: str, value: str) -> PaperNumber:
-    """Compare the label of a row with the ratio K_passive / Ka that gives its printed C_rz: the label is wrong."""
-    ratios = (10.0**exponent for exponent in range(10))
-    fitting = (ratio for ratio in ratios if rounds_to(_rotation_about_z(ACTUATOR_STIFFNESS * ratio), value))
-    return compare(place, "K_passive / Ka", "1e6", next(fitting, 0.0), "1")
+def _ratio_of_row(place: str, row: PrintedRow) -> PaperNumber:
+    """Compare the printed ratio of a row with the power of ten that gives its printed C_rz; 0 if none does."""
+    ratios, rotation_about_z = (10.0**exponent for exponent in range(10)), row.values[COMPONENTS.index("rz")]
+    fitting = (r for r in ratios if rounds_to(_rotation_about_z(ACTUATOR_STIFFNESS * r), rotation_about_z))
+    return compare(place, RATIO, row.ratio, next(fitting, 0.0), "1")
 
 
 def _rotation_about_z(passive_stiffness: float) -> float:
     """C_rz, rad/(N·m), with a stiffness of the passive links, N·m/rad."""
-    return at(f"stiffness.passive_links={passive_stiffness}").compliance.diagonal()[2]
+    return response_with(f"stiffness.passive_links={passive_stiffness}").compliance.diagonal()[2]
 
 
 def table_4() -> Iterator[PaperNumber]:
     """Stiffness against the stiffness of the passive leg."""
     for i, row in enumerate(TABLE_4):
-        response = at(f"stiffness.passive_links={row.setting}")
-        yield from _numbers(f"Table IV, row {i + 1}", row.values, response.stiffness.diagonal(), STIFFNESS_UNITS)
+        response = response_with(f"stiffness.passive_links={row.setting}")
+        yield from _compared_row(f"Table IV, row {i + 1}", row.values, response.stiffness.diagonal(), STIFFNESS_UNITS)
 
 
-def _numbers(
-    place: str, values: Sequence[str], computed: Sequence[float], units: Sequence[str]
+def _compared_row(
+    place: str, printed: Sequence[str], computed: Sequence[float], units: Sequence[str]
 ) -> Iterator[PaperNumber]:
-    for name, text, value, unit in zip(COMPONENTS, values, computed, units, strict=True):
+    """The numbers of a row beside the computed ones, in the order rx ry rz x y z."""
+    for name, text, value, unit in zip(COMPONENTS, printed, computed, units, strict=True):
         yield compare(place, name, text, value, unit)
 
 
 def coefficients(*settings: str) -> dict[str, Array]:
     """Per stiffness Ka, k52, k54, its coefficients in the six diagonal entries of K (all actuators alike)."""
-    response = at(*settings)
+    response = response_with(*settings)
     equations = equations_of_k(response, elements(response.configuration), range(len(COMPONENTS)))
     return {SYMBOLS.get(name, "Ka"): row for name, row in (equations or {}).items()}
 
@@ -230,14 +234,15 @@ def coefficients(*settings: str) -> dict[str, Array]:
 def equations_33_38() -> Iterator[PaperNumber]:
     """K diagonal as a closed form in the stiffnesses: every coefficient, also those that are not printed (zero)."""
     factors = coefficients()
-    for i, name in enumerate(COMPONENTS):
-        number, known = EQUATIONS_33_38[name]
+    for row, name in enumerate(COMPONENTS):
+        number, printed = EQUATIONS_33_38[name]
         for symbol in ("Ka", "k52", "k54"):
-            unit = _coefficient_unit(symbol, name)
-            yield compare(f"Eq. {number}", f"{symbol} in K_{name}", known.get(symbol, "0"), factors[symbol][i], unit)
+            place, entry, unit = f"Eq. {number}", f"{symbol} in K_{name}", _coefficient_unit(symbol, name)
+            yield compare(place, entry, printed.get(symbol, "0"), factors[symbol][row], unit)
 
 
 def _coefficient_unit(symbol: str, component: str) -> str:
+    """Unit of what multiplies a stiffness in an entry of K: Ka is in N/m, k52 and k54 in N·m/rad."""
     rotation = component.startswith("r")
     if symbol == "Ka":
         return "m²" if rotation else "1"
@@ -246,9 +251,9 @@ def _coefficient_unit(symbol: str, component: str) -> str:
 
 def section_4_3() -> Iterator[PaperNumber]:
     """Compliances of the initial and of the optimised design, their sums and the gain (all weights one, SI)."""
-    initial, best = at(STIFF), at(*OPTIMISED_DESIGN)
-    yield from _numbers("Section 4.3, initial", INITIAL, initial.compliance.diagonal(), COMPLIANCE_UNITS)
-    yield from _numbers("Section 4.3, optimised", OPTIMISED, best.compliance.diagonal(), COMPLIANCE_UNITS)
+    initial, best = response_with(STIFF), response_with(*OPTIMISED_DESIGN)
+    yield from _compared_row("Section 4.3, initial", INITIAL, initial.compliance.diagonal(), COMPLIANCE_UNITS)
+    yield from _compared_row("Section 4.3, optimised", OPTIMISED, best.compliance.diagonal(), COMPLIANCE_UNITS)
     before, after = sum(initial.compliance.diagonal()), sum(best.compliance.diagonal())
     yield compare("Section 4.3, initial", "sum (eq. 40)", INITIAL_SUM, before, "SI, weights 1")
     yield compare("Section 4.3, optimised", "sum (eq. 40)", OPTIMISED_SUM, after, "SI, weights 1")

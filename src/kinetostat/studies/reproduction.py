@@ -6,10 +6,9 @@ what a statement holds and for what it fails. Where the paper leaves a threshold
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from enum import StrEnum
-from itertools import chain, pairwise
-from typing import Any
+from itertools import pairwise
 
 import numpy as np
 import xarray as xr
@@ -35,9 +34,9 @@ from kinetostat.studies.printed_equations import EquationCheck, derivation
 from kinetostat.studies.printed_numbers import (
     PaperNumber,
     PrintVerdict,
-    at,
     coefficients,
     equations_33_38,
+    response_with,
     section_4_3,
     table_3,
     table_4,
@@ -48,8 +47,6 @@ FIGURE_5_RANGES = ("pose.x=-2 cm:2 cm:81", "geometry.passive_leg_offset=-2 cm:2 
 FIGURE_4_RANGES = ("stiffness.passive_links=1e3 N*m/rad:1e10 N*m/rad:71:log",)
 """Fig. 4: 1 to 1e7 times the actuator stiffness."""
 
-LATER_STEPS = 3
-"""Steps of progress after the parts: the data of Fig. 4, that of Fig. 5, and the optimisation."""
 STUDY_NAME = "zhang-gosselin-2002"
 """Name of the bundled study with the optimisation of section 4.3."""
 CONVERGED_AT = 60
@@ -69,6 +66,14 @@ RIGID_EXCESS = 0.01
 """Excess of a compliance over the one with rigid links up to which links count as rigid; ours, as in `guidelines`."""
 NEGLIGIBLE_COEFFICIENT = 1e-12
 """Relative size below which a coefficient is zero."""
+SAME_COEFFICIENTS = 1e-9
+"""Relative difference up to which two coefficients are the same: round-off of an inverse, with much room."""
+SAME_OPTIMUM = 1e-6
+"""Relative difference up to which two searches have found the same optimum: six digits, as the paper prints."""
+LEAST_BEND = 0.01
+"""Second difference of a stiffness, as a share of its change, above which it is not linear; ours."""
+PLATFORM_RADII = tuple(float(radius) for radius in np.linspace(0.07, 0.18, 12))
+"""Radii of the platform, m, about the reference design's 12 cm; our range, because the paper names none."""
 
 
 class Finding(StrEnum):
@@ -153,14 +158,15 @@ class Reproduction(Immutable):
 def reproduce(progress: Progress = silent) -> Reproduction:
     """Reproduce the whole paper; `progress` gets the number of steps done and of all steps, after each."""
     machine = load(printed_numbers.MACHINE)
-    parts: tuple[Callable[[], Iterable[Any]], ...]
-    parts = (table_3, table_4, equations_33_38, section_4_3, derivation, claims)
-    results: list[tuple[Any, ...]] = []
-    steps = len(parts) + LATER_STEPS
-    for part in parts:
-        results.append(tuple(part()))
-        progress(len(results), steps)
-    *numbers, checks, tested_claims = results
+    sources_of_numbers = (table_3, table_4, equations_33_38, section_4_3)
+    steps, comparisons = len(sources_of_numbers) + 5, list[PaperNumber]()
+    for step, numbers in enumerate(sources_of_numbers, 1):
+        comparisons += numbers()
+        progress(step, steps)
+    checks = tuple(derivation())
+    progress(steps - 4, steps)
+    tested_claims = tuple(claims())
+    progress(steps - 3, steps)
     curves = evaluate_grid(machine, FIGURE_4_RANGES, ["stiffness"])
     progress(steps - 2, steps)
     maps = evaluate_grid(machine, FIGURE_5_RANGES, ["compliance"])
@@ -169,7 +175,7 @@ def reproduce(progress: Progress = silent) -> Reproduction:
     progress(steps, steps)
     return Reproduction(
         machine=machine,
-        comparisons=tuple(chain.from_iterable(numbers)),
+        comparisons=tuple(comparisons),
         checks=checks,
         claims=tested_claims,
         curves=curves,
@@ -181,27 +187,28 @@ def reproduce(progress: Progress = silent) -> Reproduction:
 
 def claims() -> Iterator[Claim]:
     """The tests of all ten statements about stiffness, in the paper's order."""
-    yield _nearly_rigid()
-    yield _proportional()
-    yield _only_held_directions()
-    yield _held_by_both()
-    yield _first_link()
-    yield _stiff_enough()
-    yield _largest()
-    yield _link_length()
-    yield _platform_size()
-    yield _nonlinear()
+    yield _claim_on_rigid_links()
+    yield _claim_on_proportion()
+    yield _claim_on_directions_of_the_leg()
+    yield _claim_on_shared_directions()
+    yield _claim_on_first_link()
+    yield _claim_on_sufficient_stiffness()
+    yield _claim_on_largest_stiffness()
+    yield _claim_on_link_length()
+    yield _claim_on_platform_size()
+    yield _claim_on_nonlinearity()
 
 
 def _judge(fully: bool, partly: bool = False) -> Finding:
+    """The result of a test by whether all of a statement holds, or at least a part of it."""
     if fully:
         return Finding.HOLDS
     return Finding.PARTLY if partly else Finding.FAILS
 
 
-def _nearly_rigid() -> Claim:
+def _claim_on_rigid_links() -> Claim:
     rigid = _free_compliances("rigid")
-    ratios = [10.0**n for n in range(8)]
+    ratios = [10.0**n for n in range(8)]  # the place of a ratio in this list is its power of ten
     gaps = [float(np.max(_free_compliances(1e3 * ratio) / rigid - 1)) for ratio in ratios]
     response = respond(load(printed_numbers.MACHINE))
     links = with_links_together(elements(response.configuration))[-1]
@@ -221,10 +228,10 @@ def _nearly_rigid() -> Claim:
 
 def _free_compliances(passive_links: float | str) -> Array:
     """Compliances in the free directions with passive links of a stiffness, N·m/rad or "rigid"."""
-    return np.array(at(f"stiffness.passive_links={passive_links}").compliance.diagonal())[list(FREE_AXES)]
+    return np.array(response_with(f"stiffness.passive_links={passive_links}").compliance.diagonal())[list(FREE_AXES)]
 
 
-def _proportional() -> Claim:
+def _claim_on_proportion() -> Claim:
     factors = coefficients()
     clean = all(factors[k][i] <= NEGLIGIBLE_COEFFICIENT for k in ("k52", "k54") for i in FREE_AXES)
     tilted = coefficients("pose.theta5=-50 deg")["k54"][0]
@@ -239,7 +246,7 @@ def _proportional() -> Claim:
     )
 
 
-def _only_held_directions() -> Claim:
+def _claim_on_directions_of_the_leg() -> Claim:
     factors = coefficients()
     depending = {COMPONENTS[i] for k in ("k52", "k54") for i in range(6) if factors[k][i] > NEGLIGIBLE_COEFFICIENT}
     return Claim(
@@ -251,7 +258,7 @@ def _only_held_directions() -> Claim:
     )
 
 
-def _held_by_both() -> Claim:
+def _claim_on_shared_directions() -> Claim:
     factors = coefficients()
     figures = "; ".join(
         f"K_{COMPONENTS[i]} = " + " + ".join(f"{factor[i]:.6g} {name}" for name, factor in factors.items())
@@ -265,7 +272,7 @@ def _held_by_both() -> Claim:
     )
 
 
-def _first_link() -> Claim:
+def _claim_on_first_link() -> Claim:
     factors = coefficients()
     ratios = [factors["k52"][i] / factors["k54"][i] for i in HELD_AXES]
     links = analyze(load(printed_numbers.MACHINE)).attribution[:2]
@@ -274,14 +281,14 @@ def _first_link() -> Claim:
         "Guideline (v)",
         "The first passive link matters more than the second for holding the constrained directions.",
         f"Coefficient of k52 over that of k54: {ratios[0]:.4g} in K_rz, {ratios[1]:.4g} in K_y.",
-        _judge(min(ratios) > 1 + 1e-9, max(ratios) > 1 and min(ratios) > 1 - 1e-9),
+        _judge(min(ratios) > 1 + SAME_COEFFICIENTS, max(ratios) > 1 and min(ratios) > 1 - SAME_COEFFICIENTS),
         f"Holds for rotation about z, where the first link counts {ratios[0]:.4g} times as much; fails for translation "
         f"along y, where both count the same in K_y. In compliance the second link has the larger share of C_y, "
         f"{shares[1]:.0%} against {shares[0]:.0%} with equal links.",
     )
 
 
-def _stiff_enough() -> Claim:
+def _claim_on_sufficient_stiffness() -> Claim:
     factors = coefficients()
     shares = {
         ratio: min(
@@ -304,26 +311,27 @@ def _stiff_enough() -> Claim:
     )
 
 
-def _largest() -> Claim:
-    table = {ratio: at(f"stiffness.passive_links={1e3 * ratio}").stiffness.diagonal() for ratio in (1.0, 100.0)}
-    along_z = {ratio: k[5] >= max(k[3:]) for ratio, k in table.items()}
-    about_z = all(k[2] > k[0] for k in table.values())
-    first, stiff = table[1.0], table[100.0]
+def _claim_on_largest_stiffness() -> Claim:
+    ratios = (1.0, 100.0)
+    table = _stiffness_over([(f"stiffness.passive_links={1e3 * ratio}",) for ratio in ratios])
+    equal, stiff = (dict(zip(COMPONENTS, diagonal, strict=True)) for diagonal in table.tolist())
+    z_is_largest, z_is_largest_if_stiff = (k["z"] >= max(k["x"], k["y"]) for k in (equal, stiff))
+    about_z = all(k["rz"] > k["rx"] for k in (equal, stiff))
     factors = coefficients()
     crossing = (factors["Ka"][5] - factors["Ka"][4]) / (factors["k52"][4] + factors["k54"][4])
     return Claim(
         "Guideline (vii)",
         "Stiffness along z is the largest of all, and that about z exceeds that about x.",
-        f"Ratio 1: K_x, K_y, K_z = {first[3]:.4g}, {first[4]:.4g}, {first[5]:.4g} N/m; K_rz / K_rx = "
-        f"{first[2] / first[0]:.3g}. Ratio 1e2: K_y = {stiff[4]:.4g} N/m.",
-        _judge(all(along_z.values()) and about_z, along_z[1.0] and about_z),
+        f"Ratio 1: K_x, K_y, K_z = {equal['x']:.4g}, {equal['y']:.4g}, {equal['z']:.4g} N/m; K_rz / K_rx = "
+        f"{equal['rz'] / equal['rx']:.3g}. Ratio 1e2: K_y = {stiff['y']:.4g} N/m.",
+        _judge(z_is_largest and z_is_largest_if_stiff and about_z, z_is_largest and about_z),
         "Holds for z among the free directions, and for K_rz over K_rx; fails for z against y: K_y grows with the "
         f"passive leg and passes K_z from a ratio of {crossing:.3g} on. Rotational and translational stiffness have "
         "different units and cannot be compared.",
     )
 
 
-def _link_length() -> Claim:
+def _claim_on_link_length() -> Claim:
     fixed = _stiffness_over([(f"geometry.passive_links={length}",) for length in LINK_LENGTHS])
     scaled = _stiffness_over([(f"geometry.passive_links={length}", f"pose.z={length}") for length in LINK_LENGTHS])
     steps = [np.diff(fixed, axis=0) < 0, np.diff(scaled, axis=0) < 0]
@@ -353,26 +361,28 @@ def _count(flags: AnyArray) -> int:
     return int(np.count_nonzero(flags))
 
 
-def _stiffness_over(settings: list[tuple[str, ...]]) -> Array:
-    return np.array([at(*setting).stiffness.diagonal() for setting in settings])
+def _stiffness_over(settings: Sequence[tuple[str, ...]]) -> Array:
+    """The diagonal of K with each of several settings of the machine [settings x 6]."""
+    return np.array([response_with(*setting).stiffness.diagonal() for setting in settings])
 
 
-def _platform_size() -> Claim:
-    k = _stiffness_over([(f"geometry.platform_radius={radius}",) for radius in np.linspace(0.07, 0.18, 12)])
-    steps = np.diff(k, axis=0)
-    up, down = bool((steps[:, :2] > 0).all()), bool((steps[:, [3, 5]] < 0).all())
+def _claim_on_platform_size() -> Claim:
+    rows = _stiffness_over([(f"geometry.platform_radius={radius}",) for radius in PLATFORM_RADII])
+    k = dict(zip(COMPONENTS, rows.T, strict=True))
+    rises = all((np.diff(k[name]) > 0).all() for name in ("rx", "ry"))
+    falls = all((np.diff(k[name]) < 0).all() for name in ("x", "z"))
     return Claim(
         "Further fact (ii)",
         "For given links, a larger platform (within a range) is stiffer about x and y and softer along x and z.",
-        f"Rp from 7 to 18 cm: K_rx {k[0, 0]:.3g} to {k[-1, 0]:.3g}, K_ry {k[0, 1]:.3g} to "
-        f"{k[-1, 1]:.3g} N·m/rad; K_x {k[0, 3]:.4g} to {k[-1, 3]:.4g}, K_z {k[0, 5]:.4g} to "
-        f"{k[-1, 5]:.4g} N/m; each only rises or only falls.",
-        _judge(up and down),
+        f"Rp from 7 to 18 cm: K_rx {k['rx'][0]:.3g} to {k['rx'][-1]:.3g}, K_ry {k['ry'][0]:.3g} to "
+        f"{k['ry'][-1]:.3g} N·m/rad; K_x {k['x'][0]:.4g} to {k['x'][-1]:.4g}, K_z {k['z'][0]:.4g} to "
+        f"{k['z'][-1]:.4g} N/m; each only rises or only falls.",
+        _judge(rises and falls),
         "Holds from 7 to 18 cm, our range: below 7 cm K_z rises with Rp instead, above 19 cm K_x does.",
     )
 
 
-def _nonlinear() -> Claim:
+def _claim_on_nonlinearity() -> Claim:
     stiffness = _stiffness_over([(f"geometry.platform_radius={radius}",) for radius in (0.06, 0.12, 0.18)])
     bend = np.abs(stiffness[0] - 2 * stiffness[1] + stiffness[2]) / np.abs(stiffness[2] - stiffness[0])
     return Claim(
@@ -380,7 +390,7 @@ def _nonlinear() -> Claim:
         "Stiffness depends on the structural parameters nonlinearly, so that optimising them makes sense.",
         f"Second difference over the change of K for Rp = 6, 12, 18 cm: {bend.min():.2f} to {bend.max():.2f} "
         "(a linear law gives 0).",
-        _judge(bool(bend.min() > 0.01)),
+        _judge(bool(bend.min() > LEAST_BEND)),
     )
 
 
@@ -399,7 +409,7 @@ def _search_claims(genetic: Result, gradient: Result) -> Iterator[Claim]:
     reached, reached_by_gradient = (float(search.outcome.objectives[0, 0]) for search in (genetic, gradient))
     target, study = float(printed_numbers.OPTIMISED_SUM), genetic.problem.study.optimizer
     ridges = " ".join(ridge_sentences(genetic.ridges, genetic.problem))
-    agree = abs(reached / reached_by_gradient - 1.0) < 1e-6
+    agree = abs(reached / reached_by_gradient - 1.0) < SAME_OPTIMUM
     yield Claim(
         "Section 4.3, optimum",
         f"A genetic algorithm with {study.population} designs and {study.generations} generations lowers the sum of "
