@@ -54,7 +54,7 @@ def test_a_fit_moves_the_prediction_and_its_covariance_counts(tmp_path):
     fit = fit_of(tmp_path, machine, 0.2, 0.04**2)
     text = "entry, value, sigma\nstiffness_x_ry, 1 N/urad, 1 N/urad\ncompliance_rx, 6 urad/(N*m), 1 %\n"
     for row in validate_measured(machine, written(tmp_path, text), fit=fit).rows:
-        matrix, i, j = row.entry.parts
+        matrix, i, j = row.entry.place
         whole = np.array(getattr(drawn, matrix))[i, j] * (1.2 if matrix == "compliance" else 1.0 / 1.2)
         assert row.predicted == pytest.approx(whole, rel=1e-9)
         assert row.u_input == pytest.approx(abs(whole) * 0.04 / 1.2, rel=1e-9)
@@ -69,7 +69,7 @@ def test_errors_of_geometry_count_as_a_machine_drawn_otherwise_has_them(tmp_path
         analyze(load_without_limits("hexapod", [f'geometry.base_radius="{115 + off} mm"'])) for off in (0.01, -0.01)
     ]
     for row in validate_measured(machine, written(tmp_path, text)).rows:
-        matrix, i, j = row.entry.parts
+        matrix, i, j = row.entry.place
         sizes = [np.array(end.stiffness if matrix == "stiffness" else end.compliance)[i, j] for end in ends]
         sizes = [1.0 / size for size in sizes] if matrix == "free_stiffness" else sizes
         assert row.u_input == pytest.approx(abs(sizes[0] - sizes[1]) / 2e-5 * 1e-3, rel=1e-4)

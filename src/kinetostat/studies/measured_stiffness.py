@@ -7,10 +7,12 @@ Source: theory (69) to (72); ASME V&V 20-2009, *Standard for Verification and Va
 and Heat Transfer*, sections 1 and 6.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
 from kinetostat.accuracy.built import compliances_as_built
@@ -28,11 +30,15 @@ from kinetostat.spec.arguments import checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.tolerance_table import SIGMAS
 from kinetostat.studies.identification.record import read_fit
-from kinetostat.studies.stiffness_file import MeasuredEntry, MeasuredStiffness, read_stiffness
+from kinetostat.studies.stiffness_file import MeasuredEntry, MeasuredKind, MeasuredStiffness, read_stiffness
 from kinetostat.tolerances import LEAST_DIVISOR
 
 GROUPS_WITHOUT_COMPLIANCE = ("zeros", "gains", "clearances")
 """Groups of errors that leave the compliance of a machine at its pose as it is: they only move it."""
+NORMAL_VARIANCE = SIGMAS**-2
+"""Variance of a normal deviation whose limit is 1, with `SIGMAS` standard deviations to the limit."""
+EVEN_VARIANCE = 1.0 / 3.0
+"""Variance of a deviation that is evenly distributed between -1 and 1."""
 GEOMETRY_STEP = 1e-5
 """Step of differences by errors of geometry, rad or in units of the machine's length; its square is their error."""
 SAME_COMPLIANCE = 1e-9
@@ -65,6 +71,10 @@ class UncertainNumbers:
     source: str
 
 
+NOTHING_UNCERTAIN = UncertainNumbers(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros((0, 0)), "")
+"""No numbers, where no fit is given."""
+
+
 def uncertain_numbers(machine: Machine, model: ErrorModel, fit: Path | None) -> UncertainNumbers:
     """Gather what is known of a machine's numbers: from a fit, and from [tolerances] for those that were not fitted.
 
@@ -76,37 +86,48 @@ def uncertain_numbers(machine: Machine, model: ErrorModel, fit: Path | None) -> 
     Raises:
         InputError: the record cannot be read or is about another machine, or a line of [tolerances] is about nothing.
     """
-    paths = {error.path: place for place, error in enumerate(model.errors)}
-    fitted, values, covariance = _of_fit(machine, paths, fit) if fit else ([], np.zeros(0), np.zeros((0, 0)))
-    parts = toleranced_parts(machine, model.errors, machine.tolerances) if machine.tolerances else ()
-    chosen = [part for part in parts if part.group not in GROUPS_WITHOUT_COMPLIANCE and part.errors[0] not in fitted]
-    variances = [part.limit**2 * (SIGMAS**-2 if part.normal else 1.0 / 3.0) for part in chosen]
-    places = [*fitted, *(part.errors[0] for part in chosen)]
-    together = np.diag([*np.zeros(len(fitted)), *variances])
-    together[: len(fitted), : len(fitted)] = covariance
-    counted = [place for place, size in enumerate(np.diag(together)) if size > 0.0 or place < len(fitted)]
-    sources = [f'the fit "{fit}"' if fit else "", "[tolerances]" if chosen else ""]
+    places = {error.path: place for place, error in enumerate(model.errors)}
+    by_fit = _numbers_of_fit(machine, places, fit) if fit else NOTHING_UNCERTAIN
+    by_tolerance = _toleranced_numbers(machine, model, set(by_fit.places.tolist()))
     return UncertainNumbers(
-        np.array(places, dtype=np.int64)[counted],
-        np.concatenate([values, np.zeros(len(chosen))])[counted],
-        together[np.ix_(counted, counted)],
-        " and ".join(filter(None, sources)),
+        places=np.concatenate([by_fit.places, by_tolerance.places]),
+        values=np.concatenate([by_fit.values, by_tolerance.values]),
+        covariance=block_diag(by_fit.covariance, by_tolerance.covariance),
+        source=" and ".join(filter(None, [by_fit.source, by_tolerance.source])),
     )
 
 
-def _of_fit(machine: Machine, paths: Mapping[str, int], path: Path) -> tuple[list[int], Array, Array]:
-    """Places, values and covariance of what a fit says of the machine's compliance."""
+def _numbers_of_fit(machine: Machine, places: Mapping[str, int], path: Path) -> UncertainNumbers:
+    """The numbers of a fit that act on the compliance of a machine; `places` are those of errors by their paths."""
     record = read_fit(path)
     record.check(machine)
     rows = [n for n, u in enumerate(record.unknowns) if u.group not in (*GROUPS_WITHOUT_COMPLIANCE, "frame", "target")]
-    missing = [record.unknowns[n].path for n in rows if record.unknowns[n].path not in paths]
+    missing = [record.unknowns[n].path for n in rows if record.unknowns[n].path not in places]
     if missing:
         raise InputError(
             f'"{path}" is the fit of a machine with {missing[0]}, which {machine.name} does not have; give the machine '
             "as drawn, not the file that the fit has written."
         )
-    values = np.array([record.unknowns[n].value for n in rows])
-    return [paths[record.unknowns[n].path] for n in rows], values, record.covariance[np.ix_(rows, rows)]
+    return UncertainNumbers(
+        places=np.array([places[record.unknowns[n].path] for n in rows], dtype=np.int64),
+        values=np.array([record.unknowns[n].value for n in rows]),
+        covariance=record.covariance[np.ix_(rows, rows)],
+        source=f'the fit "{path}"',
+    )
+
+
+def _toleranced_numbers(machine: Machine, model: ErrorModel, fitted: Collection[int]) -> UncertainNumbers:
+    """The numbers that lines of [tolerances] are about, but not those with the places of fitted ones."""
+    parts = toleranced_parts(machine, model.errors, machine.tolerances) if machine.tolerances else ()
+    # Only a clearance has several errors, and it is in one of the groups that are left out.
+    chosen = [part for part in parts if part.group not in GROUPS_WITHOUT_COMPLIANCE and part.errors[0] not in fitted]
+    deviating = [part for part in chosen if part.limit > 0.0]
+    return UncertainNumbers(
+        places=np.array([part.errors[0] for part in deviating], dtype=np.int64),
+        values=np.zeros(len(deviating)),
+        covariance=np.diag([part.limit**2 * (NORMAL_VARIANCE if part.normal else EVEN_VARIANCE) for part in deviating]),
+        source="[tolerances]" if chosen else "",
+    )
 
 
 def spring_dyads(model: ErrorModel) -> Array:
@@ -126,22 +147,21 @@ def compliance_changes(model: ErrorModel, uncertain: UncertainNumbers, dyads: Ar
         uncertain: its uncertain numbers.
         dyads: the contributions of its springs to C [n x 6 x 6 x springs].
     """
-    first_spring = len(model.errors) - dyads.shape[3]
+    first_spring = len(model.errors) - dyads.shape[3]  # springs come last among the errors of a model
     changes = np.zeros((len(model), 6, 6, len(uncertain.places)))
-    geometry = [n for n, place in enumerate(uncertain.places) if place < first_spring]
-    for n, place in enumerate(uncertain.places):
-        if place >= first_spring:
-            changes[..., n] = dyads[..., place - first_spring]
-    if not geometry:
+    is_spring = uncertain.places >= first_spring
+    changes[..., is_spring] = dyads[..., uncertain.places[is_spring] - first_spring]
+    geometry = np.flatnonzero(~is_spring)
+    if not geometry.size:
         return changes, ()
-    if model.overconstrained or not _agrees(model, dyads):
-        return changes, tuple(model.errors[uncertain.places[n]].path for n in geometry)
+    if model.overconstrained or not _drawn_compliance_is_kept(model, dyads):
+        return changes, tuple(model.errors[place].path for place in uncertain.places[geometry])
     for n in geometry:
-        changes[..., n] = _change(model, int(uncertain.places[n]))
+        changes[..., n] = _change_by_error(model, int(uncertain.places[n]))
     return changes, ()
 
 
-def _agrees(model: ErrorModel, dyads: Array) -> bool:
+def _drawn_compliance_is_kept(model: ErrorModel, dyads: Array) -> bool:
     """Whether the machine placed without errors has the compliance of the drawn one at all poses.
 
     The two differ where springs change with the pose, as a strut does that is longer elsewhere.
@@ -151,7 +171,7 @@ def _agrees(model: ErrorModel, dyads: Array) -> bool:
     return bool((differences.max(axis=(1, 2)) <= SAME_COMPLIANCE * np.abs(drawn).max(axis=(1, 2))).all())
 
 
-def _change(model: ErrorModel, place: int) -> Array:
+def _change_by_error(model: ErrorModel, place: int) -> Array:
     """The change of the compliance per unit of an error, by central differences [n x 6 x 6]."""
     step = GEOMETRY_STEP * (model.length if model.errors[place].kind == "length" else 1.0)
     errors = step * np.eye(len(model.errors))[place]
@@ -255,8 +275,9 @@ class MeasuredComparison:
     @property
     def _diagonal(self) -> Sequence[MeasuredRow]:
         """Rows whose value says how large a number is; all where there are none."""
-        rows = [row for row in self.rows if row.entry.parts[0] != "deflection" and len(set(row.entry.parts[1:])) == 1]
-        return rows or self.rows
+        places = [row.entry.place for row in self.rows]
+        is_diagonal = [p.row == p.column and p.kind is not MeasuredKind.DEFLECTION for p in places]
+        return list(compress(self.rows, is_diagonal)) or self.rows
 
 
 @checked
@@ -302,12 +323,12 @@ def _comparison(
     compliance, between_routes = computed + changes @ uncertain.values, computed - dyads.sum(axis=3)
     loads = measured.deflections.wrenches if measured.deflections else np.zeros((1, 6))
     entries = [
-        _Entry(entry, compliance[entry.row], loads[entry.row], machine.family.components, model.length)
+        _computed_entry(entry, compliance[entry.pose], loads[entry.pose], machine.family.components, model.length)
         for entry in measured.entries
     ]
-    rates = np.array([each.changes(changes[each.entry.row]) for each in entries]).reshape(len(entries), -1)
-    numeric = np.array([each.changes(between_routes[each.entry.row, :, :, None])[0] for each in entries])
-    inputs = rates @ uncertain.covariance @ rates.T
+    rates = np.array([each.changes(changes[each.entry.pose]) for each in entries]).reshape(len(entries), -1)
+    numeric = np.array([each.changes(between_routes[each.entry.pose, :, :, None])[0] for each in entries])
+    inputs = rates @ uncertain.covariance @ rates.T  # covariance of all entries by the machine's numbers
     sigma = np.array([each.entry.sigma for each in entries])
     rows = tuple(
         MeasuredRow(
@@ -319,6 +340,7 @@ def _comparison(
         )
         for each, error, variance in zip(entries, numeric, np.diag(inputs), strict=True)
     )
+    # In units of each entry's sigma, so that entries of all kinds of units can be in one matrix.
     errors = np.array([row.error for row in rows]) / sigma
     covariance = (inputs + np.diag(numeric**2 + sigma**2)) / np.outer(sigma, sigma)
     chi_square = float(errors @ np.linalg.solve(covariance, errors))
@@ -333,58 +355,71 @@ def _comparison(
     )
 
 
-class _Entry:
-    """A measured entry as a function of the compliance [6 x 6] at its pose."""
+@dataclass(frozen=True)
+class _ComputedEntry:
+    """A measured number beside that of the machine.
 
-    def __init__(
-        self, entry: MeasuredEntry, compliance: Array, load: Array, components: Sequence[int], length: float
-    ) -> None:
-        """Prepare it.
+    Attributes:
+        entry: the measured number.
+        value: the number by the compliance of the machine at its pose, SI.
+        slopes: derivatives of this number by the entries of that compliance [6 x 6], theory (71).
+    """
 
-        Args:
-            entry: the measured number.
-            compliance: compliance of the machine at its pose, SI [6 x 6].
-            load: wrench under which a deflection was measured, SI [6].
-            components: components of twists that the machine has; K is the inverse of C over these.
-            length: characteristic length of the machine, m.
-
-        Raises:
-            InputError: a stiffness was measured where the model is rigid.
-        """
-        self.entry, self.load = entry, load
-        self.matrix, self.i, self.j = entry.parts
-        self.compliance = compliance
-        self.stiffness = np.zeros((6, 6))
-        if self.matrix == "stiffness":
-            places = np.ix_(list(components), list(components))
-            units = np.array([length if c < 3 else 1.0 for c in components])
-            scaled = compliance[places] * np.outer(units, units)
-            if np.linalg.svd(scaled)[1][-1] <= RIGID_SHARE * np.abs(scaled).max():
-                raise InputError(
-                    f"{entry.name} is measured in line {entry.line}, but the model is rigid in some direction, so that "
-                    "K has no end; give its springs stiffnesses, or compare entries of C (compliance_z)."
-                )
-            self.stiffness[places] = np.linalg.inv(scaled) * np.outer(units, units)
-        elif self.matrix == "free_stiffness" and not compliance[self.i, self.i] > 0.0:
-            raise InputError(
-                f"{entry.name} is measured in line {entry.line}, but the model is rigid along "
-                f"{COMPONENTS[self.i]}; give its springs stiffnesses, or leave the line out."
-            )
-
-    @property
-    def value(self) -> float:
-        if self.matrix == "deflection":
-            return float(self.compliance[self.i] @ self.load)
-        if self.matrix == "stiffness":
-            return float(self.stiffness[self.i, self.j])
-        entry = float(self.compliance[self.i, self.j])
-        return entry if self.matrix == "compliance" else 1.0 / entry
+    entry: MeasuredEntry
+    value: float
+    slopes: Array
 
     def changes(self, changes: Array) -> Array:
-        """Changes of the number by those of the compliance [6 x 6 x p], to first order [p], theory (71)."""
-        if self.matrix == "deflection":
-            return np.asarray(self.load @ changes[self.i])
-        if self.matrix == "stiffness":
-            return np.asarray(-np.einsum("a,abp,b->p", self.stiffness[self.i], changes, self.stiffness[:, self.j]))
-        entry = changes[self.i, self.j]
-        return np.asarray(entry if self.matrix == "compliance" else -entry / self.compliance[self.i, self.i] ** 2)
+        """Changes of the number by those of the compliance [6 x 6 x p], to first order [p]."""
+        involved = self.slopes != 0.0  # the others may be infinite
+        return np.asarray(self.slopes[involved] @ changes[involved])
+
+
+def _computed_entry(
+    entry: MeasuredEntry, compliance: Array, load: Array, components: Sequence[int], length: float
+) -> _ComputedEntry:
+    """Compute a measured number.
+
+    Args:
+        entry: the measured number.
+        compliance: compliance of the machine at its pose, SI [6 x 6].
+        load: wrench under which a deflection was measured, SI [6].
+        components: components of twists that the machine has; K is the inverse of C over these.
+        length: characteristic length of the machine, m.
+
+    Raises:
+        InputError: a stiffness was measured where the model is rigid.
+    """
+    kind, i, j = entry.place
+    slopes = np.zeros((6, 6))
+    match kind:
+        case MeasuredKind.DEFLECTION:
+            value, slopes[i] = compliance[i] @ load, load
+        case MeasuredKind.COMPLIANCE:
+            value, slopes[i, j] = compliance[i, j], 1.0
+        case MeasuredKind.FREE_STIFFNESS:
+            if not compliance[i, i] > 0.0:
+                raise InputError(
+                    f"{entry.name} is measured in line {entry.line}, but the model is rigid along {COMPONENTS[i]}; "
+                    "give its springs stiffnesses, or leave the line out."
+                )
+            value, slopes[i, i] = 1.0 / compliance[i, i], -1.0 / compliance[i, i] ** 2
+        case MeasuredKind.STIFFNESS:
+            stiffness = _stiffness(entry, compliance, components, length)
+            value, slopes = stiffness[i, j], -np.outer(stiffness[i], stiffness[:, j])
+    return _ComputedEntry(entry, float(value), slopes)
+
+
+def _stiffness(entry: MeasuredEntry, compliance: Array, components: Sequence[int], length: float) -> Array:
+    """K, the inverse of C over the components of the machine [6 x 6], SI; arguments as of `_computed_entry`."""
+    places = np.ix_(list(components), list(components))
+    units = np.array([length if c < 3 else 1.0 for c in components])
+    scaled = compliance[places] * np.outer(units, units)
+    if np.linalg.svd(scaled)[1][-1] <= RIGID_SHARE * np.abs(scaled).max():
+        raise InputError(
+            f"{entry.name} is measured in line {entry.line}, but the model is rigid in some direction, so that "
+            "K has no end; give its springs stiffnesses, or compare entries of C (compliance_z)."
+        )
+    stiffness = np.zeros((6, 6))
+    stiffness[places] = np.linalg.inv(scaled) * np.outer(units, units)
+    return stiffness

@@ -4,7 +4,10 @@ A file of entries has the columns entry, value and sigma; one of deflections is 
 """
 
 from collections.abc import Sequence
+from enum import StrEnum
+from itertools import product
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,13 +20,33 @@ from kinetostat.studies.identification.measurements import Measurements, Sigmas,
 from kinetostat.studies.poses import GivenColumn, columns_of
 from kinetostat.units import KINDS, UnitError, parse
 
-MEASURED_MATRICES = ("stiffness", "compliance", "free_stiffness")
-"""Matrices to which an entry may belong: K, C, or 1 / C of its diagonal, which a load along one component measures."""
 COLUMNS = ("entry", "value", "sigma")
 """Columns of a file of entries; the last one may be missing."""
 KIND_BY_UNIT = {kind.unit: kind.name for kind in KINDS.values() if kind.name.endswith((" stiffness", " compliance"))}
 """Kinds of the entries of K and C by their SI units."""
 SIGMA_ADVICE = 'write a column sigma, such as 2 N/um or 3 %, or give --sigma "3 %"'
+"""The end of messages about a number without a standard deviation."""
+
+
+class MeasuredKind(StrEnum):
+    """The kinds of measured numbers, by the beginnings of their names."""
+
+    STIFFNESS = "stiffness"
+    """An entry of K."""
+    COMPLIANCE = "compliance"
+    """An entry of C."""
+    FREE_STIFFNESS = "free_stiffness"
+    """The reciprocal of an entry of the diagonal of C, which a load along one component measures."""
+    DEFLECTION = "deflection"
+    """A component of the deflection under a load."""
+
+
+class EntryPlace(NamedTuple):
+    """The place of a measured number: its kind, and its row and column in COMPONENTS, which are equal if it has one."""
+
+    kind: MeasuredKind
+    row: int
+    column: int
 
 
 @dataclass(frozen=True)
@@ -35,7 +58,7 @@ class MeasuredEntry:
         unit: its SI unit.
         value, sigma: the number and its standard deviation, which is more than 0, SI.
         line: its line in the file.
-        row: the number of the pose; 0 for an entry of a matrix.
+        pose: the number of the pose; 0 for an entry of a matrix.
     """
 
     name: str
@@ -43,14 +66,14 @@ class MeasuredEntry:
     value: float
     sigma: float
     line: int
-    row: int = 0
+    pose: int = 0
 
     @property
-    def parts(self) -> tuple[str, int, int]:
-        """The matrix that it belongs to, and its row and column in COMPONENTS."""
-        matrix = next(m for m in (*MEASURED_MATRICES, "deflection") if self.name.startswith(f"{m}_"))
-        names = self.name.removeprefix(f"{matrix}_").split("_")
-        return matrix, COMPONENTS.index(names[0]), COMPONENTS.index(names[-1])
+    def place(self) -> EntryPlace:
+        """The place of the number, which its name says."""
+        kind = next(kind for kind in MeasuredKind if self.name.startswith(f"{kind}_"))
+        components = self.name.removeprefix(f"{kind}_").split("_")
+        return EntryPlace(kind, COMPONENTS.index(components[0]), COMPONENTS.index(components[-1]))
 
 
 @dataclass(frozen=True)
@@ -141,14 +164,16 @@ def _entry(machine: Machine, name: str, value: str, sigma: str, line: int) -> Me
 
 def _entry_names(machine: Machine) -> list[str]:
     """The names of all entries, in either order of their components."""
-    names, components = [], machine.family.component_names
-    for matrix in MEASURED_MATRICES:
-        pairs = [(a, b) for a in components for b in components if a == b or matrix != "free_stiffness"]
-        names += [f"{matrix}_{a}" if a == b else f"{matrix}_{a}_{b}" for a, b in pairs]
-    return names
+    components = machine.family.component_names
+    pairs = [name if name == other else f"{name}_{other}" for name, other in product(components, repeat=2)]
+    return [
+        *(f"{kind}_{pair}" for kind in (MeasuredKind.STIFFNESS, MeasuredKind.COMPLIANCE) for pair in pairs),
+        *(f"{MeasuredKind.FREE_STIFFNESS}_{name}" for name in components),
+    ]
 
 
 def _transposed_name(name: str) -> str:
+    """The name of the entry on the other side of the diagonal, which is equal: K and C are symmetric."""
     matrix, first, second = name.rsplit("_", 2)
     return f"{matrix}_{second}_{first}"
 
@@ -166,7 +191,9 @@ def _number(text: str, kind: str, subject: str) -> float:
 
 def _deflections(machine: Machine, path: Path, sigma: str, sigma_angle: str) -> MeasuredStiffness:
     """The deflections of a file of measurements as entries, one for each measured value."""
-    sigmas = Sigmas(_default(sigma, "length", "--sigma"), _default(sigma_angle, "angle", "--sigma-angle"))
+    sigmas = Sigmas(
+        _usual_deviation(sigma, "length", "--sigma"), _usual_deviation(sigma_angle, "angle", "--sigma-angle")
+    )
     data = read_measurements(machine, path, sigmas)
     names = [name for name in data.values if name.startswith("deflection.")]
     if not names:
@@ -175,29 +202,29 @@ def _deflections(machine: Machine, path: Path, sigma: str, sigma_angle: str) -> 
             "loads (deflection.z [um], force.z [N])."
         )
     entries = []
-    for row in range(len(data)):
+    for pose in range(len(data)):
         for name in names:
-            value, deviation = float(data.values[name][row]), float(data.sigma[name][row])
-            if not np.isfinite(value):
+            value, deviation = float(data.values[name][pose]), float(data.sigma[name][pose])
+            if not np.isfinite(value):  # an empty cell: this component was not measured at this pose
                 continue
             if not np.isfinite(deviation):
-                raise data.refusal(row, f"nothing says how sure {name} is; add a column sigma.{name} [um] or --sigma.")
+                raise data.refusal(pose, f"nothing says how sure {name} is; add a column sigma.{name} [um] or --sigma.")
             component = name.removeprefix("deflection.")
             unit = "rad" if component.startswith("r") else "m"
             entries.append(
                 MeasuredEntry(
-                    name=f"deflection_{component}",
+                    name=f"{MeasuredKind.DEFLECTION}_{component}",
                     unit=unit,
                     value=value,
                     sigma=deviation,
-                    line=data.lines[row],
-                    row=row,
+                    line=data.lines[pose],
+                    pose=pose,
                 )
             )
     return MeasuredStiffness(str(path), tuple(entries), data)
 
 
-def _default(text: str, kind: str, option: str) -> float:
+def _usual_deviation(text: str, kind: str, option: str) -> float:
     """A standard deviation for what has none in the file, SI; infinity if it is not given."""
     size = _number(text, kind, option) if text else np.inf
     if not size > 0.0:

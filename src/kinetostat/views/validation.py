@@ -203,7 +203,7 @@ def verdict_of(row: "MeasuredRow", display: Display) -> str:
         scale = _scale(row, display)
         ends = f"{number(low * scale.factor, digits=2)} to {number(high * scale.factor, digits=2)} {scale.unit}"
         return f"off by {ends}"
-    is_stiffness = row.entry.parts[0] in ("stiffness", "free_stiffness")
+    is_stiffness = row.entry.place.kind in ("stiffness", "free_stiffness")
     model_is_stiffer = (abs(row.predicted) > size) == is_stiffness
     ends = f"{number(100.0 * low / size, digits=2)} to {number(100.0 * high / size, digits=2)}\N{NO-BREAK SPACE}%"
     return f"too {'stiff' if model_is_stiffer else 'compliant'} by {ends}"
