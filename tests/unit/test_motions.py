@@ -24,7 +24,7 @@ def motion_of(machine, folder, text, points=400):
 @pytest.mark.parametrize(("length", "feed"), [(0.5, 0.2), (0.01, 5.0), (1.0, 0.8), (1e-4, 1.0)])
 def test_a_move_ends_where_it_shall_and_keeps_its_limits(length, feed, jerk):
     phases = profile(length, feed, 4.0, jerk)
-    time, (way, speed, gain) = along_profile(phases, 50)
+    time, way, speed, gain = along_profile(phases, 50)
     assert way[-1] == pytest.approx(length, rel=1e-12)
     assert speed[-1] == pytest.approx(0.0, abs=1e-12 * feed)
     assert speed.max() <= feed * (1.0 + 1e-12)

@@ -1,6 +1,6 @@
 """Motions: poses over time from a CSV file, as positions, rates and accelerations of the coordinates of the pose.
 
-The head of the file says which kind it is: poses at times; moves with a feed rate, which begin and end at rest; or
+The head of the file says of which kind it is: poses at times; moves with a feed rate, which begin and end at rest; or
 sines about the pose of the machine. A machine file may name such files in its requirements.
 
 Source: theory (96)-(98).
@@ -29,15 +29,17 @@ from kinetostat.spec.requirements import Requirement, is_text
 from kinetostat.studies.moves import along_profile, moves_between, profile
 from kinetostat.studies.poses import GivenColumn, Where, column_values, columns_of, read_columns, unit_doubt
 
-TIME, FEED, ACCELERATION, JERK, SHAPE, FIELD = "time", "feed", "acceleration", "jerk", "shape", "field"
-"""Names of columns that are no fields of the machine."""
+TIME, FEED, ACCELERATION, JERK, SHAPE = "time", "feed", "acceleration", "jerk", "shape"
+"""Names of columns beside those of the pose and of loads: when, or how fast, each pose is reached."""
+FIELD, AMPLITUDE, FREQUENCY, PHASE = "field", "amplitude", "frequency", "phase"
+"""Names of the columns of a file of sines: a file that has the first one is one."""
 QUANTITIES = {
     TIME: Quantity("duration", "when the pose is reached"),
     FEED: Quantity("speed", "greatest speed of the move", positive=True),
     ACCELERATION: Quantity("acceleration", "greatest acceleration along the path", positive=True),
     JERK: Quantity("jerk", "greatest jerk along the path", positive=True),
 }
-"""The quantities of those columns that are numbers."""
+"""The quantities of those columns of a file of poses that are numbers."""
 SHAPES = ("line", "through", "arc")
 """Words of the column `shape`: a straight line to the pose, a point through which the next arc leads, an arc to it."""
 SPLINE_DEGREE = 5
@@ -110,31 +112,12 @@ def read_motion(machine: Machine, path: Path, points: int = 400, text: str | Non
     by_name = {column.name: column for column in columns}
     try:
         if FIELD in by_name:
-            return _sines(machine, by_name, points)
-        special = {name: by_name.pop(name) for name in (*QUANTITIES, SHAPE) if name in by_name}
-
-        def where(name: str, row: int) -> str:
-            return f"line {numbers[row]}, column {name}"
-
-        amounts = {
-            name: column_values(column, QUANTITIES[name], where) for name, column in special.items() if name != SHAPE
-        }
-        coordinates, loads = _coordinates_and_loads(machine, list(by_name.values()), where)
-        if TIME in amounts:
-            _refuse_columns(special, (FEED, ACCELERATION, JERK, SHAPE), "a motion with times")
-            motion = _through_poses(coordinates, loads, amounts[TIME], points)
-            return replace(motion, unit_doubt=unit_doubt(machine, columns))
-        if FEED not in amounts:
-            raise InputError(
-                "it has neither times nor a feed rate; add a column such as time [s] or feed [mm/s] beside the pose."
-            )
-        if ACCELERATION not in amounts:
-            raise InputError("it has a feed rate but no acceleration; add a column such as acceleration [m/s**2].")
-        shapes = _shapes(special.get(SHAPE), len(numbers))
-        motion = _moves(machine, coordinates, loads, amounts, shapes, points)
-        return replace(motion, unit_doubt=unit_doubt(machine, columns))
+            motion = _sines(machine, by_name, points)
+        else:
+            motion = _through_lines(machine, by_name, points, numbers)
     except InputError as error:
         raise InputError(f'"{path}": {error}') from None
+    return replace(motion, unit_doubt=unit_doubt(machine, columns))
 
 
 def motion_of(requirement: Requirement, machine: Machine, points: int = 400) -> Motion:
@@ -178,10 +161,34 @@ def check_lines(part: str, given: str) -> None:
         )
 
 
-def _refuse_columns(columns: Mapping[str, GivenColumn], names: Sequence[str], what: str) -> None:
-    for name in names:
-        if name in columns:
-            raise InputError(f"{what} has no column {name}; remove it.")
+def _through_lines(machine: Machine, columns: Mapping[str, GivenColumn], points: int, numbers: Sequence[int]) -> Motion:
+    """The motion through the poses of a file, at their times or by moves.
+
+    Args:
+        machine: the machine whose pose moves.
+        columns: columns of the file by their names.
+        points: as of `read_motion`.
+        numbers: number of the line of each pose in the file, for messages.
+    """
+
+    def where(name: str, row: int) -> str:
+        return f"line {numbers[row]}, column {name}"
+
+    amounts = {name: column_values(columns[name], QUANTITIES[name], where) for name in QUANTITIES if name in columns}
+    of_poses = [column for name, column in columns.items() if name not in (*QUANTITIES, SHAPE)]
+    coordinates, loads = _coordinates_and_loads(machine, of_poses, where)
+    if TIME in amounts:
+        for name in (FEED, ACCELERATION, JERK, SHAPE):
+            if name in columns:
+                raise InputError(f"a motion with times has no column {name}; remove it.")
+        return _through_poses(coordinates, loads, amounts[TIME], points)
+    if FEED not in amounts:
+        raise InputError(
+            "it has neither times nor a feed rate; add a column such as time [s] or feed [mm/s] beside the pose."
+        )
+    if ACCELERATION not in amounts:
+        raise InputError("it has a feed rate but no acceleration; add a column such as acceleration [m/s**2].")
+    return _moves(machine, coordinates, loads, amounts, _shapes(columns.get(SHAPE), len(numbers)), points)
 
 
 def _coordinates_and_loads(
@@ -189,7 +196,7 @@ def _coordinates_and_loads(
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """All coordinates of the pose by name, and the forces and moments that are given by leaf path, at each line."""
     poses = read_columns(machine, columns, where)
-    loads = {path: rows for path, rows in poses.leaves.items() if _LOAD.fullmatch(path)}
+    loads = {path: column for path, column in poses.leaves.items() if _LOAD.fullmatch(path)}
     for path in poses.leaves:
         if not path.startswith(POSE) and path not in loads:
             raise InputError(
@@ -238,6 +245,11 @@ def _path(names: Sequence[str], rows: Sequence[Array], loads: Mapping[str, Array
 
 
 def _shapes(column: GivenColumn | None, count: int) -> list[str]:
+    """The words of the column `shape`, one for each of so many lines; lines without a column or a word.
+
+    Raises:
+        InputError: a word is not a shape, or an arc lacks the point through which it leads, or the pose where it ends.
+    """
     if column is None:
         return ["line"] * count
     words = [str(word).strip().lower() or "line" for word in column.entries]
@@ -274,12 +286,13 @@ def _moves(
     for move in moves:
         limits = {name: float(column[move.end]) for name, column in amounts.items()}
         phases = profile(move.curve.length, limits[FEED], limits[ACCELERATION], limits.get(JERK, np.inf))
-        time, covered = along_profile(phases, points_of_phase)
-        rows.append(move.curve.in_time(*covered))
+        covered = along_profile(phases, points_of_phase)
+        rows.append(move.curve.in_time(covered))
         for name, column in loads.items():
-            loads_of_moves[name].append(np.interp(time, move.moments(phases), column[move.start : move.end + 1]))
-        times.append(clock + time)
-        clock += float(time[-1])
+            of_poses = column[move.start : move.end + 1]
+            loads_of_moves[name].append(np.interp(covered.times, move.moments(phases), of_poses))
+        times.append(clock + covered.times)
+        clock += float(covered.times[-1])
     joined_rows = [np.concatenate(parts) for parts in zip(*rows, strict=True)]
     joined_loads = {name: np.concatenate(parts) for name, parts in loads_of_moves.items()}
     phases_in_words = "seven phases" if JERK in amounts else "three phases"
@@ -341,12 +354,12 @@ def _sines(machine: Machine, columns: Mapping[str, GivenColumn], points: int) ->
 def _sines_of_lines(machine: Machine, columns: Mapping[str, GivenColumn]) -> list[_Sine]:
     """The sines of the lines of a file, whose amplitudes have the units of what swings."""
     for name in columns:
-        if name not in (FIELD, "amplitude", "frequency", "phase"):
+        if name not in (FIELD, AMPLITUDE, FREQUENCY, PHASE):
             raise InputError(
                 f"a motion of sines has no column {shorten(name)}; it has field, amplitude, frequency, phase. What "
                 "swings, a coordinate of the pose or a force, stands in the column field of its line."
             )
-    for name in ("amplitude", "frequency"):
+    for name in (AMPLITUDE, FREQUENCY):
         if name not in columns:
             raise InputError(f"a motion of sines has no column {name}; add one, e.g. amplitude, frequency [Hz].")
     sines = []
@@ -354,10 +367,11 @@ def _sines_of_lines(machine: Machine, columns: Mapping[str, GivenColumn]) -> lis
         word = str(entry).strip()
         path = _path_of_swing(machine, word)
         cell = {key: GivenColumn(key, [column.entries[number]], column.unit) for key, column in columns.items()}
-        field = GivenColumn(word, cell["amplitude"].entries, columns["amplitude"].unit)
-        amplitude = read_columns(machine, [field], lambda name, _: f"amplitude of {name}").values[0][0]
-        frequency = column_values(cell["frequency"], Quantity("frequency", "", positive=True), _words_of_column)[0]
-        phase = column_values(cell["phase"], Quantity("angle", ""), _words_of_column)[0] if "phase" in cell else 0.0
+        # An amplitude is read as a value of what swings, whose kind of quantity it has.
+        of_field = replace(cell[AMPLITUDE], name=word)
+        amplitude = read_columns(machine, [of_field], lambda name, _: f"amplitude of {name}").values[0][0]
+        frequency = column_values(cell[FREQUENCY], Quantity("frequency", "", positive=True), _words_of_column)[0]
+        phase = column_values(cell[PHASE], Quantity("angle", ""), _words_of_column)[0] if PHASE in cell else 0.0
         sines.append(_Sine(path, float(amplitude), 2.0 * np.pi * float(frequency), float(phase)))
     return sines
 

@@ -7,7 +7,7 @@ Source: theory (97) and (98).
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -17,15 +17,42 @@ from kinetostat.arrays import Array
 from kinetostat.frozen import dataclass
 from kinetostat.spec.errors import InputError
 
-Phase: TypeAlias = tuple[float, float, float]
-"""A part of a move whose acceleration changes evenly: its duration, s, and its first and last acceleration, m/s²."""
-Phases: TypeAlias = list[Phase]
-"""All parts of a move, in order."""
 STRAIGHT = 1e-9
 """Sine of the angle between two chords of an arc below which it is a straight line: with eight digits of a chord, the
 circle through its points has none."""
 ROUND_OFF_OF_TIME = 1e-15
 """Error of the time at which a point is passed, s: the round-off of a move of some seconds."""
+
+
+class Phase(NamedTuple):
+    """A part of a move whose acceleration changes evenly.
+
+    Attributes:
+        duration: s, more than 0.
+        first, last: acceleration at its beginning and at its end, m/s².
+    """
+
+    duration: float
+    first: float
+    last: float
+
+
+Phases: TypeAlias = list[Phase]
+"""All parts of a move, in order."""
+
+
+class LengthInTime(NamedTuple):
+    """The length that a move has covered over time.
+
+    Attributes:
+        times: times from its start, s [n].
+        lengths, speeds, accelerations: the covered length and its rates, m, m/s and m/s² [n].
+    """
+
+    times: Array
+    lengths: Array
+    speeds: Array
+    accelerations: Array
 
 
 @dataclass(frozen=True)
@@ -72,20 +99,21 @@ class Curve:
         """Coordinates with their first and second derivatives by the length [n x coordinates]."""
         share = (lengths / self.length)[:, None]
         slope = np.broadcast_to((self.end - self.start) / self.length, (len(lengths), len(self.start))).copy()
-        place, bend = self.start + (self.end - self.start) * share, np.zeros_like(slope)
+        place, curvature = self.start + (self.end - self.start) * share, np.zeros_like(slope)
         if self.arc is not None:
             angle, rate = share * self.arc.angle, self.arc.angle / self.length
             outward = np.cos(angle) * self.arc.first + np.sin(angle) * self.arc.second
             onward = np.cos(angle) * self.arc.second - np.sin(angle) * self.arc.first
             place[:, self.places] = self.arc.centre + outward
             slope[:, self.places] = onward * rate
-            bend[:, self.places] = -outward * rate**2
-        return place, slope, bend
+            curvature[:, self.places] = -outward * rate**2
+        return place, slope, curvature
 
-    def in_time(self, lengths: Array, speeds: Array, accelerations: Array) -> tuple[Array, Array, Array]:
-        """Coordinates with their rates and accelerations [n x coordinates], by the length, m, and its rates [n]."""
-        place, slope, bend = self.at(lengths)
-        return place, slope * speeds[:, None], bend * speeds[:, None] ** 2 + slope * accelerations[:, None]
+    def in_time(self, covered: LengthInTime) -> tuple[Array, Array, Array]:
+        """Coordinates with their rates and accelerations while a length is covered [n x coordinates]."""
+        place, slope, curvature = self.at(covered.lengths)
+        speeds = covered.speeds[:, None]
+        return place, slope * speeds, curvature * speeds**2 + slope * covered.accelerations[:, None]
 
 
 @dataclass(frozen=True)
@@ -107,7 +135,7 @@ class Move:
         Raises:
             InputError: the point between its ends is in line with these, so that nobody can say when it is passed.
         """
-        duration = sum(time for time, _, _ in phases if time > 0.0)
+        duration = sum(phase.duration for phase in phases)
         if self.end - self.start == 1:
             return [0.0, duration]
         if self.curve.arc is None:
@@ -174,7 +202,7 @@ def _arc(start: Array, middle: Array, end: Array) -> Arc | None:
 
 
 def profile(length: float, feed: float, acceleration: float, jerk: float = np.inf) -> Phases:
-    """The phases of a move from rest to rest, theory (98).
+    """The phases of a move from rest to rest that take time, theory (98).
 
     The speed is the greatest that can be reached and left again on this length, at most the feed rate. The acceleration
     grows and falls with the jerk, and holds between, if it comes to its limit.
@@ -186,8 +214,8 @@ def profile(length: float, feed: float, acceleration: float, jerk: float = np.in
     if np.isinf(jerk):
         speed = min(feed, np.sqrt(length * acceleration))
         rise_time, cruise_time = speed / acceleration, length / speed - speed / acceleration
-        braking = (rise_time, -acceleration, -acceleration)
-        return [(rise_time, acceleration, acceleration), (cruise_time, 0.0, 0.0), braking]
+        rise = [Phase(rise_time, acceleration, acceleration)]
+        return _with_cruise_and_braking(rise, cruise_time)
     # The speed that the jerk alone allows on this length, or, where the acceleration comes to its limit, that with it.
     speed = np.cbrt(length**2 * jerk / 4.0)
     if speed * jerk > acceleration**2:
@@ -198,17 +226,21 @@ def profile(length: float, feed: float, acceleration: float, jerk: float = np.in
     peak = jerk * growing
     holding = max(speed / peak - growing, 0.0)
     cruising = max(length / speed - (2.0 * growing + holding), 0.0)
-    rise = [(growing, 0.0, peak), (holding, peak, peak), (growing, peak, 0.0)]
-    return [*rise, (cruising, 0.0, 0.0), *((time, -first, -last) for time, first, last in rise)]
+    rise = [Phase(growing, 0.0, peak), Phase(holding, peak, peak), Phase(growing, peak, 0.0)]
+    return _with_cruise_and_braking(rise, cruising)
 
 
-def along_profile(phases: Phases, points: int) -> tuple[Array, tuple[Array, Array, Array]]:
-    """Times (s) in all phases, so many in each with both of its ends, and length, speed and acceleration then."""
+def _with_cruise_and_braking(rise: Phases, cruise_time: float) -> Phases:
+    """A rise of the speed, a cruise, and the fall that mirrors the rise; without phases that take no time."""
+    braking = [Phase(phase.duration, -phase.last, -phase.first) for phase in reversed(rise)]
+    return [phase for phase in (*rise, Phase(cruise_time, 0.0, 0.0), *braking) if phase.duration > 0.0]
+
+
+def along_profile(phases: Phases, points: int) -> LengthInTime:
+    """The length at so many times of each phase, both of its ends among them."""
     times, lengths, speeds, accelerations = [], [], [], []
     end_time = end_length = end_speed = 0.0
     for duration, first, last in phases:
-        if duration <= 0.0:
-            continue
         time = np.linspace(0.0, duration, points)
         jerk = (last - first) / duration
         accelerations.append(first + jerk * time)
@@ -217,20 +249,18 @@ def along_profile(phases: Phases, points: int) -> tuple[Array, tuple[Array, Arra
         times.append(end_time + time)
         end_time += duration
         end_length, end_speed = float(lengths[-1][-1]), float(speeds[-1][-1])
-    return np.concatenate(times), (np.concatenate(lengths), np.concatenate(speeds), np.concatenate(accelerations))
+    return LengthInTime(*map(np.concatenate, (times, lengths, speeds, accelerations)))
 
 
 def moment_at(phases: Phases, length: float) -> float:
-    """The time at which a move has come so far, s.
+    """The time at which a move has covered a length, s.
 
     Args:
         phases: phases of the move, see `profile`.
         length: between 0 and that of its path, m.
     """
-    clock = passed = speed = 0.0
+    clock = passed = speed = 0.0  # time, length and speed at the end of the phases before
     for duration, first, last in phases:
-        if duration <= 0.0:
-            continue
         beyond = Polynomial([passed - length, speed, first / 2.0, (last - first) / (6.0 * duration)])
         if beyond(duration) >= 0.0:
             return clock + float(brentq(beyond, 0.0, duration, xtol=ROUND_OFF_OF_TIME))

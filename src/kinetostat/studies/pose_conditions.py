@@ -24,9 +24,8 @@ LONGEST_CONDITION = 200
 _CONDITION = re.compile(r"\s*([a-z_]+(?:_\d+)?)\s*(<=|>=|<|>)\s*([^<>=]+?)\s*")
 """A condition: quantity, comparison and value."""
 COMPARED_KINDS = (
-    *("length", "angle", "force", "moment", "mass", "frequency"),
-    *("speed", "rate", "acceleration", "angular acceleration"),
-)
+    "length", "angle", "force", "moment", "mass", "frequency", "speed", "rate", "acceleration", "angular acceleration",
+)  # fmt: skip
 """Kinds of quantities beside stiffnesses and compliances, of which several have one unit."""
 KIND_OF_UNIT = {
     kind.unit: kind.name
@@ -51,6 +50,11 @@ class PoseCondition:
     quantity: str
     comparison: str
     value: float
+
+    @property
+    def wants_more(self) -> bool:
+        """Whether greater values are better: the comparison is > or >=."""
+        return self.comparison.startswith(">")
 
     def holds(self, values: Array) -> Mask:
         """Tell at which points the quantity, given in SI, meets the condition; where it is NaN, it does not."""

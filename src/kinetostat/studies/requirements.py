@@ -6,7 +6,7 @@ A pose that has no result fails its requirement: a machine that cannot get there
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -24,12 +24,11 @@ from kinetostat.machine.parameters import Parameter, find, shown, values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.document import parse
 from kinetostat.spec.errors import InputError, choice
-from kinetostat.spec.fields import parse_range
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.requirements import Requirement
 from kinetostat.studies.evaluation import point_of_file
 from kinetostat.studies.pose_conditions import PoseCondition, parse_condition
-from kinetostat.studies.poses import GivenColumn, grid_of, read_columns
+from kinetostat.studies.poses import GivenColumn, chosen_axes, grid_of, read_columns
 from kinetostat.studies.quantities import refuse_absent
 
 if TYPE_CHECKING:
@@ -140,21 +139,33 @@ def required_motors(machine: Machine) -> "motors.MotorChoice":
 
     The motors are in the order of the file, without its verdicts; none of a motion that the machine cannot make.
     """
-    pairs = [_motor_along(machine, each)[1:] for each in machine.requirements.values() if each.fits]
-    stuck = next((loads for loads, candidate in pairs if candidate is None), None)
+    required = [_motor_along(machine, each) for each in machine.requirements.values() if each.fits]
+    stuck = next((each.loads for each in required if each.candidate is None), None)
     if stuck is not None:
         return motors.MotorChoice(machine, stuck.status, stuck.message)
-    candidates = tuple(candidate for _, candidate in pairs if candidate is not None)
+    candidates = tuple(each.candidate for each in required if each.candidate is not None)
     sentences = (
         f"Of {each.name}, which is required, the motion uses {motors.share_in_words(each)}." for each in candidates
     )
     return motors.MotorChoice(machine, Status.OK, " ".join(sentences), candidates)
 
 
-def _motor_along(
-    machine: Machine, requirement: Requirement
-) -> "tuple[motions.Motion, DriveLoads, motors.MotorCandidate | None]":
-    """Return the motion of a requirement, what it asks of the drives, and how the motor fits; None without curves."""
+class _RequiredMotor(NamedTuple):
+    """A motor that a requirement names.
+
+    Attributes:
+        motion: the motion of the requirement.
+        loads: what it asks of the drives with this motor.
+        candidate: how the motor fits; None of a motion that the machine cannot make.
+    """
+
+    motion: "motions.Motion"
+    loads: "DriveLoads"
+    candidate: "motors.MotorCandidate | None"
+
+
+def _motor_along(machine: Machine, requirement: Requirement) -> _RequiredMotor:
+    """Return the motor of a requirement along its motion."""
     catalogue = motors.read_catalogue()
     if requirement.catalogue:
         motions.check_lines("catalogue", requirement.catalogue)
@@ -163,7 +174,8 @@ def _motor_along(
     motion = motions.motion_of(requirement, machine)
     geared, inertia = motors.with_transmission(machine, catalogue, requirement.gear, requirement.screw)
     loads = motors.loads_with(geared, catalogue.motors[motor], inertia, motion)
-    return motion, loads, None if loads.curves is None else motors.candidate_of(catalogue, motor, loads)
+    candidate = None if loads.curves is None else motors.candidate_of(catalogue, motor, loads)
+    return _RequiredMotor(motion, loads, candidate)
 
 
 def _motor_verdict(machine: Machine, name: str, requirement: Requirement) -> Verdict:
@@ -173,10 +185,10 @@ def _motor_verdict(machine: Machine, name: str, requirement: Requirement) -> Ver
     if loads.curves is not None and candidate is not None:
         worst, place = candidate.greatest_share, candidate.drive
         row = [drive.name for drive in loads.drives].index(candidate.drive)
-        speeds = candidate.hardest[0] == "speed"
-        curve = loads.curves.motor_speed if speeds else loads.curves.motor_torque
-        point = int(np.abs(curve[row]).argmax())
-        pose = {path: float(rows[point]) for path, rows in motion.path.columns.items()}
+        is_too_fast = candidate.hardest[0] == "speed"
+        curves = loads.curves.motor_speed if is_too_fast else loads.curves.motor_torque
+        point = int(np.abs(curves[row]).argmax())
+        pose = {path: float(column[point]) for path, column in motion.path.columns.items()}
         words = f"the motion uses {motors.share_in_words(candidate)}, most at {candidate.drive}."
     return Verdict(
         name=name,
@@ -203,22 +215,26 @@ def _verdicts_of(state: MachineState, name: str, requirement: Requirement) -> li
         return [_motor_verdict(state.machine, name, requirement)]
     machine, show = state.machine, state.machine.display.show
     conditions = [parse_condition(text, machine.family.component_names) for text in requirement.demand]
-    points, varied, where = _poses(machine, requirement)
+    poses = _poses(machine, requirement)
     names = list(dict.fromkeys(condition.quantity for condition in conditions))
-    refuse_absent(state, names, varied)
-    answer = evaluate(machine, points, names) if varied or needs_state(machine, names) else _at_the_pose(state, names)
+    refuse_absent(state, names, poses.varied)
+    if poses.varied or needs_state(machine, names):
+        answer = evaluate(machine, poses.points, names)
+    else:
+        answer = _at_the_pose(state, names)
+    return [_verdict(name, condition, answer, poses, show) for condition in conditions]
 
-    return [_verdict(name, condition, answer, points, varied, where, show) for condition in conditions]
+
+class _Poses(NamedTuple):
+    """The poses of a requirement, the fields that vary over them (none at the pose of the file), and them in words."""
+
+    points: Points
+    varied: Sequence[Parameter]
+    words: str
 
 
 def _verdict(
-    name: str,
-    condition: PoseCondition,
-    answer: Evaluation,
-    points: Points,
-    varied: Sequence[Parameter],
-    where: str,
-    show: Callable[[float, str], str],
+    name: str, condition: PoseCondition, answer: Evaluation, poses: _Poses, show: Callable[[float, str], str]
 ) -> Verdict:
     """Judge a condition at the worst of some poses.
 
@@ -226,15 +242,14 @@ def _verdict(
         name: name of the requirement.
         condition: the condition.
         answer: its quantity at the poses.
-        points: the poses.
-        varied: fields that vary over them.
-        where: the poses in words.
+        poses: the poses.
         show: writes a value in the units of the machine.
     """
     amounts = answer.values[condition.quantity]
-    place = _worst(condition, amounts)
-    pose = {path: float(column[0]) for path, column in points.columns(place, place + 1).items()} if varied else {}
-    worst = None if np.isnan(amounts[place]) else float(amounts[place])
+    row = _worst_row(condition, amounts)
+    columns = poses.points.columns(row, row + 1) if poses.varied else {}
+    pose = {path: float(column[0]) for path, column in columns.items()}
+    worst = None if np.isnan(amounts[row]) else float(amounts[row])
     holds = condition.holds(amounts)
     return Verdict(
         name=name,
@@ -242,14 +257,14 @@ def _verdict(
         quantity=condition.quantity,
         unit=QUANTITIES[condition.quantity].unit,
         bound=condition.value,
-        poses=points.size,
-        where=where,
+        poses=poses.points.size,
+        where=poses.words,
         met=bool(holds.all()),
         worst=worst,
         margin=_margin(condition, worst),
         worst_pose=pose,
-        place=", ".join(f"{field.shown} {show(pose[field.leaves[0]], field.unit)}" for field in varied),
-        status=Status(int(answer.status[place])).word,
+        place=", ".join(f"{field.shown} {show(pose[field.leaves[0]], field.unit)}" for field in poses.varied),
+        status=Status(int(answer.status[row])).word,
         failed=int((~holds).sum()),
     )
 
@@ -261,31 +276,27 @@ def _at_the_pose(state: MachineState, names: Sequence[str]) -> Evaluation:
     return Evaluation({name: np.array([amount]) for name, amount in amounts.items()}, np.array([int(status)]))
 
 
-def _poses(machine: Machine, requirement: Requirement) -> tuple[Points, list[Parameter], str]:
-    """Return the poses, the fields that vary, and the poses in words."""
+def _poses(machine: Machine, requirement: Requirement) -> _Poses:
+    """Return the poses of a requirement: those of its ranges, of its list, or else the pose of the file."""
     if requirement.over and requirement.poses:
         raise InputError("it has both over and poses; give one of them, or make two requirements.")
     if requirement.over:
         return _poses_of_box(machine, requirement.over)
     if requirement.poses:
         return _poses_of_list(machine, requirement.poses)
-    return point_of_file(machine), [], "at the pose of the file"
+    return _Poses(point_of_file(machine), [], "at the pose of the file")
 
 
-def _poses_of_box(machine: Machine, over: Sequence[str]) -> tuple[Points, list[Parameter], str]:
+def _poses_of_box(machine: Machine, over: Sequence[str]) -> _Poses:
     """The poses of all combinations of some ranges."""
-    ranges = [parse_range(text) for text in over]
-    fields = [find(machine.family, span.field) for span in ranges]
-    grid = grid_of([*zip(ranges, fields, strict=True)])
+    axes = chosen_axes(machine, over)
+    grid, fields = grid_of(axes), [field for _, field in axes]
     if grid.size > MOST_POSES:
         raise InputError(f"the box has {grid.size:,} poses; at most {MOST_POSES:,} are judged: lower the counts.")
-    for path in grid.paths:
-        if list(grid.paths).count(path) > 1:
-            raise InputError(f"{path} has two ranges; give it one.")
-    return grid, fields, f"over {', '.join(f.shown for f in fields)}"
+    return _Poses(grid, fields, f"over {', '.join(field.shown for field in fields)}")
 
 
-def _poses_of_list(machine: Machine, poses: Sequence[Mapping[str, Any]]) -> tuple[Points, list[Parameter], str]:
+def _poses_of_list(machine: Machine, poses: Sequence[Mapping[str, Any]]) -> _Poses:
     """The poses of a list; coordinates that one does not name are those of the file."""
     of_file = values(machine)
     paths = {name: find(machine.family, name).path for row in poses for name in row}
@@ -295,19 +306,20 @@ def _poses_of_list(machine: Machine, poses: Sequence[Mapping[str, Any]]) -> tupl
         for path in dict.fromkeys(paths.values())
     ]
     read = read_columns(machine, columns, lambda path, i: f"poses.{i}.{shown(path)}")
-    return PointTable(read.leaves), list(read.fields), "of the list"
+    return _Poses(PointTable(read.leaves), list(read.fields), "of the list")
 
 
-def _worst(condition: PoseCondition, amounts: Array) -> int:
+def _worst_row(condition: PoseCondition, amounts: Array) -> int:
     """Return the number of the worst pose: the first without a result, or the one farthest on the wrong side."""
     unanswered = np.flatnonzero(np.isnan(amounts))
     if unanswered.size:
         return int(unanswered[0])
-    return int(np.argmin(amounts) if condition.comparison.startswith(">") else np.argmax(amounts))
+    return int(np.argmin(amounts) if condition.wants_more else np.argmax(amounts))
 
 
 def _margin(condition: PoseCondition, worst: float | None) -> float | None:
+    """The share of the bound by which a value keeps it, see `Verdict.margin`."""
     if worst is None or condition.value == 0.0 or not math.isfinite(worst):
         return None
-    spare = worst - condition.value if condition.comparison.startswith(">") else condition.value - worst
+    spare = worst - condition.value if condition.wants_more else condition.value - worst
     return spare / abs(condition.value)
