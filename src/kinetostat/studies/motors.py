@@ -10,7 +10,7 @@ Source: theory (100).
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -99,7 +99,7 @@ class ScrewRating:
 SOURCE = "source"
 """Field of an entry that says where its numbers are printed."""
 TABLES: Mapping[str, Any] = {"motors": MotorRating, "gears": GearRating, "screws": ScrewRating}
-"""Tables of a catalogue, with the class of their entries."""
+"""Tables of a catalogue, with the class of their entries; `Catalogue` has a field of each name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,25 +131,33 @@ def catalogue_of(document: documents.Document, origin: str) -> Catalogue:
     Raises:
         InputError: one of its entries has a mistake: names the entry and the field.
     """
-    for name in document:
-        choice(name, TABLES, f'the table of "{origin}"')
-    parts: dict[str, dict[str, Any]] = {name: {} for name in TABLES}
+    ratings: dict[str, dict[str, Any]] = {table_name: {} for table_name in TABLES}
     sources: dict[tuple[str, str], str] = {}
-    for kind, entries in document.items():
+    for table_name, entries in document.items():
+        choice(table_name, TABLES, f'the table of "{origin}"')
         if not isinstance(entries, dict):
-            raise InputError(f'"{origin}": {kind} is not a table; write [{kind}.NAME] with its numbers below.')
-        for name, given in entries.items():
-            parts[kind][name] = _entry(TABLES[kind], f'"{origin}": {kind}.{documents.toml_key(name)}', given)
-            sources[kind, name] = str(given.get(SOURCE, ""))
-    return Catalogue(parts["motors"], parts["gears"], parts["screws"], sources)
+            raise InputError(
+                f'"{origin}": {table_name} is not a table; write [{table_name}.NAME] with its numbers below.'
+            )
+        for name, written in entries.items():
+            where = f'"{origin}": {table_name}.{documents.toml_key(name)}'
+            ratings[table_name][name] = _rating(TABLES[table_name], where, written)
+            sources[table_name, name] = str(written.get(SOURCE, ""))
+    return Catalogue(**ratings, sources=sources)
 
 
-def _entry(kind: Any, where: str, given: Any) -> Any:
-    """A motor, gear or screw from its table as it is written; `where` names it in messages."""
-    if not isinstance(given, dict):
+def _rating(kind: Any, where: str, written: Any) -> Any:
+    """Read an entry of a table.
+
+    Args:
+        kind: class of the entries of the table, see `TABLES`.
+        where: the entry, for messages.
+        written: the entry as the document has it.
+    """
+    if not isinstance(written, dict):
         raise InputError(f"{where} is not a table; write its fields below its name in brackets.")
     fields, values = quantities(kind), dict[str, float | tuple[float, ...]]()
-    for field, value in given.items():
+    for field, value in written.items():
         choice(field, [*fields, SOURCE], f"the field of {where}")
         if field == SOURCE:
             continue
@@ -354,29 +362,41 @@ def candidate_of(catalogue: Catalogue, name: str, loads: DriveLoads) -> MotorCan
     if loads.curves is None or loads.motion is None:
         raise ValueError("a motion without an answer asks nothing of a motor")
     torques, speeds = np.abs(loads.curves.motor_torque), np.abs(loads.curves.motor_speed)
-    shares: list[tuple[float, ...]] = []  # peak torque, continuous torque and speed, drive by drive
+    shares = []
     for torque, speed, drive in zip(torques, speeds, loads.drives, strict=True):
         rms_speed = root_mean_square(loads.motion.times, speed)
-        peak = _share(torque, motor.limit(peak=True, speeds=speed))
-        continuous = _share(np.array([drive.rms_torque]), motor.limit(peak=False, speeds=np.array([rms_speed])))
-        shares.append((peak, continuous, drive.motor_speed / motor.greatest_speed))
+        limit_at_rms_speed = motor.limit(peak=False, speeds=np.array([rms_speed]))
+        shares.append(
+            _Shares(
+                peak=_greatest_share(torque, motor.limit(peak=True, speeds=speed)),
+                continuous=_greatest_share(np.array([drive.rms_torque]), limit_at_rms_speed),
+                speed=drive.motor_speed / motor.greatest_speed,
+            )
+        )
     hardest = max(range(len(shares)), key=lambda k: max(shares[k]))
     ratios = [drive.inertia_ratio for drive in loads.drives if drive.inertia_ratio is not None]
-    peak, continuous, speed_share = (max(column) for column in zip(*shares, strict=True))
     return MotorCandidate(
         name=name,
         motor=motor,
         loads=loads,
         drive=loads.drives[hardest].name,
-        peak=peak,
-        continuous=continuous,
-        speed=speed_share,
+        peak=max(share.peak for share in shares),
+        continuous=max(share.continuous for share in shares),
+        speed=max(share.speed for share in shares),
         inertia_ratio=max(ratios, default=None),
         source=catalogue.sources["motors", name],
     )
 
 
-def _share(torque: Array, limit: Array) -> float:
+class _Shares(NamedTuple):
+    """Shares of the limits of a motor that one drive uses: of peak torque, of continuous torque, and of speed."""
+
+    peak: float
+    continuous: float
+    speed: float
+
+
+def _greatest_share(torque: Array, limit: Array) -> float:
     """The greatest share of a limit that is used; infinite where there is a torque and no limit left."""
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.where(torque == 0.0, 0.0, torque / limit)

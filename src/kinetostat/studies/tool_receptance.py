@@ -7,7 +7,7 @@ The first line names the columns: "frequency [Hz]", and for each entry a real an
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,8 +25,25 @@ FREQUENCY = "frequency"
 KINDS = {(False, False): "linear compliance", (True, True): "torsional compliance"}
 """Kind of an entry by whether a rotation is moved and a moment pushes; all others are rad/N, the same as m/(N·m)."""
 
-Key: TypeAlias = tuple[str, int, str, int]
-"""Place and component that move, then place and component of the force."""
+
+class _Side(NamedTuple):
+    """A side of an entry, of what moves or of what is pushed: "tip" or "flange", and the number of the component."""
+
+    place: str
+    component: int
+
+    def __str__(self) -> str:
+        return f"{self.place}.{COMPONENTS[self.component]}"
+
+
+class _Entry(NamedTuple):
+    """An entry of the receptance, as the head of its columns names it."""
+
+    moved: _Side
+    pushed: _Side
+
+    def __str__(self) -> str:
+        return f"{self.moved}/{self.pushed}"
 
 
 def read_tool(path: str | Path) -> FreeTool:
@@ -50,7 +67,8 @@ def read_tool(path: str | Path) -> FreeTool:
 
 
 def _tool_of(columns: list[GivenColumn], numbers: list[int]) -> FreeTool:
-    parts: dict[tuple[Key, str], Array] = {}
+    """The tool of some columns; `numbers` are those of their lines in the file."""
+    parts: dict[tuple[_Entry, str], Array] = {}
     frequencies: Array | None = None
     for column in columns:
         if column.name == FREQUENCY:
@@ -62,9 +80,9 @@ def _tool_of(columns: list[GivenColumn], numbers: list[int]) -> FreeTool:
                 f"{shorten(column.name)} is not a column of a receptance; write frequency [Hz], or such as "
                 f"tip.x/flange.ry real: tip or flange, and one of {', '.join(COMPONENTS)}, on both sides."
             )
-        moved, pushed = COMPONENTS.index(match[2]), COMPONENTS.index(match[4])
-        kind = KINDS.get((moved < 3, pushed < 3), "coupling compliance")
-        parts[(match[1], moved, match[3], pushed), match[5]] = _values(column, Quantity(kind, ""), numbers)
+        moved, pushed = (_Side(match[k], COMPONENTS.index(match[k + 1])) for k in (1, 3))
+        kind = KINDS.get((moved.component < 3, pushed.component < 3), "coupling compliance")
+        parts[_Entry(moved, pushed), match[5]] = _values(column, Quantity(kind, ""), numbers)
     if frequencies is None or len(frequencies) < 2:
         raise InputError("it needs a column frequency [Hz] with at least two lines.")
     falling = np.flatnonzero(np.diff(frequencies) <= 0.0)
@@ -79,48 +97,54 @@ def _values(column: GivenColumn, quantity: Quantity, numbers: list[int]) -> Arra
     return column_values(column, quantity, lambda name, i: f"line {numbers[i]}, {name}")
 
 
-def _entries(parts: Mapping[tuple[Key, str], Array]) -> dict[Key, Complex]:
-    """Real and imaginary parts together, each entry also with what moves and what is pushed exchanged."""
-    entries: dict[Key, Complex] = {}
-    for key in dict.fromkeys(key for key, _ in parts):
-        text = f"{key[0]}.{COMPONENTS[key[1]]}/{key[2]}.{COMPONENTS[key[3]]}"
-        real, imaginary = (parts.get((key, part)) for part in ("real", "imaginary"))
+def _entries(parts: Mapping[tuple[_Entry, str], Array]) -> dict[_Entry, Complex]:
+    """Real and imaginary parts together, each entry also with what moves and what is pushed exchanged.
+
+    Where a file has both of such a pair, each keeps its own numbers.
+    """
+    entries: dict[_Entry, Complex] = {}
+    for entry in dict.fromkeys(entry for entry, _ in parts):
+        real, imaginary = (parts.get((entry, part)) for part in ("real", "imaginary"))
         if real is None or imaginary is None:
             missing = "real" if real is None else "imaginary"
-            raise InputError(f"{text} has no column {missing}; add it, with zeros where it is nothing.")
-        entries[key] = real + 1.0j * imaginary
-        if key[:2] == key[2:] and np.median(imaginary) > 0.0:
+            raise InputError(f"{entry} has no column {missing}; add it, with zeros where it is nothing.")
+        entries[entry] = real + 1.0j * imaginary
+        if entry.moved == entry.pushed and np.median(imaginary) > 0.0:
             raise InputError(
-                f"the imaginary parts of {text} are positive, as of a tool that gains energy; receptances are of "
+                f"the imaginary parts of {entry} are positive, as of a tool that gains energy; receptances are of "
                 "motions exp(+i omega t): change the sign of all imaginary parts."
             )
-    return {(*key[2:], *key[:2]): value for key, value in entries.items()} | entries
+    return {_Entry(entry.pushed, entry.moved): value for entry, value in entries.items()} | entries
 
 
-def _free_tool(frequencies: Array, entries: Mapping[Key, Complex]) -> FreeTool:
-    places = {place: sorted({key[1] for key in entries if key[0] == place}) for place in ("tip", "flange")}
-    for place, components in places.items():
-        for component in components:
-            name = f"{place}.{COMPONENTS[component]}"
-            if (place, component, place, component) not in entries:
-                raise InputError(f"{name}/{name} is missing; a tool that moves there must say how it does.")
-            if place == "tip" and not any((place, component, "flange", part) in entries for part in places["flange"]):
-                raise InputError(
-                    f"nothing says how {name} moves if the flange is pushed; add {name}/flange.{name[4:]}."
-                )
-    if not places["tip"]:
+def _free_tool(frequencies: Array, entries: Mapping[_Entry, Complex]) -> FreeTool:
+    """The tool with these entries, of which none may lack what couples it to the machine.
+
+    Raises:
+        InputError: a component that moves has no entry of its own or, at the tip, none with the flange.
+    """
+    sides = sorted({entry.moved for entry in entries})
+    tip, flange = ([side for side in sides if side.place == place] for place in ("tip", "flange"))
+    for side in (*tip, *flange):
+        if _Entry(side, side) not in entries:
+            raise InputError(f"{side}/{side} is missing; a tool that moves there must say how it does.")
+        if side in tip and not any(_Entry(side, pushed) in entries for pushed in flange):
+            component = COMPONENTS[side.component]
+            raise InputError(f"nothing says how {side} moves if the flange is pushed; add {side}/flange.{component}.")
+    if not tip:
         raise InputError("no column is about the tip; add tip.x/tip.x real and imaginary, say.")
 
-    def matrix(moved: str, pushed: str) -> Complex:
+    def matrix(moved: list[_Side], pushed: list[_Side]) -> Complex:
+        """Entries between components [frequencies x moved x pushed]; 0 where the file names none."""
         zeros = np.zeros(len(frequencies), dtype=complex)
-        rows = [[entries.get((moved, i, pushed, k), zeros) for k in places[pushed]] for i in places[moved]]
+        rows = [[entries.get(_Entry(row, column), zeros) for column in pushed] for row in moved]
         return np.moveaxis(np.array(rows), 2, 0)
 
     return FreeTool(
         frequencies=frequencies,
-        tip=tuple(places["tip"]),
-        flange=tuple(places["flange"]),
-        tip_tip=matrix("tip", "tip"),
-        tip_flange=matrix("tip", "flange"),
-        flange_flange=matrix("flange", "flange"),
+        tip=tuple(side.component for side in tip),
+        flange=tuple(side.component for side in flange),
+        tip_tip=matrix(tip, tip),
+        tip_flange=matrix(tip, flange),
+        flange_flange=matrix(flange, flange),
     )

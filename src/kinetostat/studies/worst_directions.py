@@ -45,23 +45,28 @@ def every_direction(form: RigidForm, speed: float, acceleration: float) -> Motio
     hardest = drives[:, NUMBERS_OF_DRIVE.index("inertia"), count:]
     speeds = np.concatenate([np.zeros((1, count)), *_both_ways(fastest), _spread(count)]) * speed
     accelerations = np.concatenate(_both_ways(hardest)) * acceleration
-    pairs = np.repeat(speeds, len(accelerations), axis=0), np.tile(accelerations, (len(speeds), 1))
+    each_speed, each_acceleration = (
+        np.repeat(speeds, len(accelerations), axis=0),
+        np.tile(accelerations, (len(speeds), 1)),
+    )
     return Motion(
         kind=f"every direction at {speed:.4g} m/s and {acceleration:.4g} m/s²",
-        times=np.zeros(len(pairs[0])),
-        path=_at_pose(coordinates, moving, *pairs),
+        times=np.zeros(len(each_speed)),
+        path=_at_pose(coordinates, moving, each_speed, each_acceleration),
         timeless=True,
     )
 
 
-def _at_pose(here: Mapping[str, float], moving: Sequence[str], rates: Array, accelerations: Array) -> PosePath:
-    """Rates and accelerations of some coordinates [n x moving], all at one pose."""
+def _at_pose(pose: Mapping[str, float], moving: Sequence[str], rates: Array, accelerations: Array) -> PosePath:
+    """Rates and accelerations of the moving coordinates [n x moving], all at one pose; the others are at rest."""
     count = len(rates)
-    parts = [
-        {name: part[:, moving.index(name)] if name in moving else np.zeros(count) for name in here}
-        for part in (rates, accelerations)
-    ]
-    return PosePath({name: np.full(count, value) for name, value in here.items()}, *parts)
+
+    def by_name(table: Array) -> dict[str, Array]:
+        return {name: table[:, moving.index(name)] if name in moving else np.zeros(count) for name in pose}
+
+    return PosePath(
+        {name: np.full(count, value) for name, value in pose.items()}, by_name(rates), by_name(accelerations)
+    )
 
 
 def _both_ways(rows: Array) -> list[Array]:
