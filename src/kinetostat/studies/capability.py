@@ -32,6 +32,21 @@ from kinetostat.studies.directions import unit_direction
 from kinetostat.studies.quantities import refuse_absent
 from kinetostat.tolerances import DEPENDENT
 
+SETS = {
+    ("wrench", "translation"): ("force", "N"),
+    ("wrench", "rotation"): ("moment", "N·m"),
+    ("twist", "translation"): ("speed", "m/s"),
+    ("twist", "rotation"): ("rate", "rad/s"),
+    ("acceleration", "translation"): ("acceleration", "m/s**2"),
+    ("acceleration", "rotation"): ("angular acceleration", "rad/s**2"),
+}
+"""Name and SI unit of the amounts of each set, by what it is about and by the block of components that vary in it."""
+PHRASES = {
+    "force": "hold {} in whichever direction a force acts",
+    "speed": "move the tool at {} in whichever direction",
+    "acceleration": "accelerate it by {} in whichever direction",
+}
+"""Phrases about the least amounts of the sets that the message names; the amount stands in the braces."""
 NO_REST_SENTENCE = "{} comes to no stable rest under its loads; `kinetostat analyze --loaded` says why."
 """The answer of a machine that is meant loaded and comes to no rest; its name stands in the braces."""
 
@@ -183,9 +198,9 @@ def capability(machine: Machine | MachineState, along: Sequence[float] = ()) -> 
 def limits_of_drives(state: MachineState) -> set[str]:
     """Return which of "load" and "speed" the file of a machine limits of its drives; none where it limits neither."""
     drives = drive_limits(state.machine, state.configuration)
-    loads = any(is_set(drive.lower) or is_set(drive.upper) for drive in drives)
-    speeds = any(is_set(drive.speed) for drive in drives)
-    return {what for what, known in (("load", loads), ("speed", speeds)) if known}
+    limits_loads = any(is_set(drive.lower) or is_set(drive.upper) for drive in drives)
+    limits_speeds = any(is_set(drive.speed) for drive in drives)
+    return ({"load"} if limits_loads else set()) | ({"speed"} if limits_speeds else set())
 
 
 def _with_loads(state: MachineState) -> Response:
@@ -228,23 +243,21 @@ def _wrenches(response: Response, drives: Sequence[DriveAtPose], block: str) -> 
             names.append(tuple(drives[drive].name for drive in face.drives))
     matrix = np.array(normals).reshape(-1, 3)
     least = float(greatest_ball(response.faces, part, length))
-    name, unit = ("force", "N") if block == "translation" else ("moment", "N·m")
-    return _set(name, unit, least, matrix, np.array(bounds), _row_space(matrix), names)
+    return _set(("wrench", block), least, matrix, np.array(bounds), _row_space(matrix), names)
 
 
 def _twists(response: Response, drives: Sequence[DriveAtPose], block: str) -> CapabilitySet | None:
     """The velocities without turning, or the turns about the tool point, that the drives allow; None if it has none."""
-    moving = _motions(response.transmission, block)
-    if moving is None:
+    motions = _motions(response.transmission, block)
+    if motions is None:
         return None
-    directions, rates = moving
+    directions, rates = motions
     moves = np.linalg.norm(rates, axis=1) > DEPENDENT * np.linalg.norm(rates, axis=1).max(initial=0.0)
     speeds = np.array([drive.speed for drive in drives])
     names = [(drive.name,) for drive, takes_part in zip(drives, moves, strict=True) if takes_part]
     least = float(greatest_speed(response.transmission, speeds.tolist(), BLOCKS[block]))
-    name, unit = ("speed", "m/s") if block == "translation" else ("rate", "rad/s")
     matrix, bounds = np.vstack([rates[moves], -rates[moves]]), np.tile(speeds[moves], 2)
-    return _set(name, unit, least, matrix, bounds, directions, names * 2)
+    return _set(("twist", block), least, matrix, bounds, directions, names * 2)
 
 
 def _accelerations(response: Response, drives: Sequence[DriveAtPose], block: str) -> CapabilitySet | None:
@@ -258,22 +271,19 @@ def _accelerations(response: Response, drives: Sequence[DriveAtPose], block: str
     normals = np.array([face.normal.components() for face in response.acceleration_faces], dtype=float)
     rows = normals[:, BLOCKS[block]] @ directions @ directions.T
     sizes = np.linalg.norm(rows, axis=1)
-    met = np.flatnonzero(sizes > DEPENDENT * sizes.max(initial=0.0))
-    if not len(met):
+    limiting = np.flatnonzero(sizes > DEPENDENT * sizes.max(initial=0.0))
+    if not len(limiting):
         return None
-    faces = [response.acceleration_faces[number] for number in met]
+    faces = [response.acceleration_faces[number] for number in limiting]
     names = [tuple(drives[drive].name for drive in face.drives) for face in faces]
-    matrix = np.vstack([rows[met], -rows[met]])
+    matrix = np.vstack([rows[limiting], -rows[limiting]])
     bounds = np.array([float(face.upper) for face in faces] + [-float(face.lower) for face in faces])
     least = float(greatest_acceleration(response.acceleration_faces, response.transmission, BLOCKS[block]))
-    unit = "m/s**2" if block == "translation" else "rad/s**2"
-    name = "acceleration" if block == "translation" else "angular acceleration"
-    return _set(name, unit, least, matrix, bounds, directions, names * 2)
+    return _set(("acceleration", block), least, matrix, bounds, directions, names * 2)
 
 
 def _set(
-    name: str,
-    unit: str,
+    subject_and_block: tuple[str, str],
     least: float,
     normals: Array,
     bounds: Array,
@@ -283,19 +293,20 @@ def _set(
     """The set of all amounts a with normals a <= bounds, and how far it reaches.
 
     Args:
-        name, unit: name and unit of the amounts.
+        subject_and_block: a key of `SETS`.
         least: radius of the largest ball in the set.
         normals, bounds: normals and bounds of its faces [faces x 3], [faces].
         directions: an orthonormal basis of the directions that it extends in [3 x k].
         names: names of the drives that are at their bounds in each face.
     """
+    name, unit = SETS[subject_and_block]
     sizes = np.linalg.norm(normals, axis=1)
     reaches = bounds / sizes
     has_room = least > 0.0
     in_directions = vertices((normals / sizes[:, None]) @ directions, reaches) if has_room and len(bounds) else None
     corners = np.zeros((0, 3)) if in_directions is None else in_directions @ directions.T
     without_corners = math.inf if has_room else math.nan
-    worst = int(np.argmin(reaches)) if np.isfinite(least) else None
+    worst = int(np.argmin(reaches)) if np.isfinite(least) else None  # number of the face that limits the least amount
     return CapabilitySet(
         name=name,
         unit=unit,
@@ -327,9 +338,10 @@ def _motions(transmission: Transmission, block: str) -> tuple[Array, Array] | No
     """
     if transmission.wrenches is None:
         return None
-    stopped, driven = (_block_of(some, block) for some in (transmission.constraints, transmission.wrenches))
-    directions = _null_space(stopped, transmission, block)
-    return (directions, driven @ directions @ directions.T) if directions.shape[1] else None
+    directions = _null_space(_block_of(transmission.constraints, block), transmission, block)
+    if not directions.shape[1]:
+        return None
+    return directions, _block_of(transmission.wrenches, block) @ directions @ directions.T
 
 
 def _block_of(wrenches: Sequence[Wrench], block: str) -> Array:
@@ -346,23 +358,15 @@ def _null_space(stopped: Array, transmission: Transmission, block: str) -> Array
     return np.asarray(rows[int((values > DEPENDENT).sum()) :].T)
 
 
-SENTENCES = {
-    "force": "hold {} in whichever direction a force acts",
-    "moment": "hold {} about whichever axis a moment acts",
-    "speed": "move the tool at {} in whichever direction",
-    "rate": "turn the tool at {} about whichever axis",
-    "acceleration": "accelerate it by {} in whichever direction",
-}
-"""Phrases about the least amount of a set, which stands in the braces."""
-
-
 def _message(machine: Machine, sets: Sequence[CapabilitySet]) -> str:
-    phrases = [
-        SENTENCES[each.name].format(machine.display.show(each.least, each.unit))
-        for each in sets
-        if each.name in ("force", "speed", "acceleration") and math.isfinite(each.least)
-    ]
     if any(each.least < 0.0 for each in sets):
         return "The drives do not hold the loads that count already."
-    listed = ", ".join(phrases[:-1]) + " and " + phrases[-1] if len(phrases) > 1 else "".join(phrases)
-    return f"The drives {listed}." if phrases else "No drive limits a force or a speed of the tool here."
+    phrases = [
+        PHRASES[each.name].format(machine.display.show(each.least, each.unit))
+        for each in sets
+        if each.name in PHRASES and math.isfinite(each.least)
+    ]
+    if not phrases:
+        return "No drive limits a force or a speed of the tool here."
+    *first, last = phrases
+    return f"The drives {', '.join(first)} and {last}." if first else f"The drives {last}."

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -157,30 +157,30 @@ def _targets_of_slab(machine: Machine, columns: Mapping[str, Array], count: int)
     """Solve one slab of poses; without actuators where the machine can have no state of rest at any of them."""
     state = states_at(machine, columns, count)
     status = np.broadcast_to(state.free.status, (count,)).astype(np.int64)
-    rows = np.flatnonzero(~np.isin(status, WITHOUT_SEARCH_FOR_REST))
-    if not len(rows):
+    searched = np.flatnonzero(~np.isin(status, WITHOUT_SEARCH_FOR_REST))
+    if not len(searched):
         return _empty_targets((), status)
-    placed = {path: column[rows] for path, column in columns.items()}
-    reached = _targets_at(state.at(rows), machine, placed)
-    if len(rows) == count:
-        return reached
-    targets = _empty_targets(reached.actuators, status)
+    targets = _targets_at(state.at(searched), machine, {path: column[searched] for path, column in columns.items()})
+    if len(searched) == count:
+        return targets
+    all_targets = _empty_targets(targets.actuators, status)
     for name in TARGET_ARRAYS:
-        getattr(targets, name)[rows] = getattr(reached, name)
-    return targets
+        getattr(all_targets, name)[searched] = getattr(targets, name)
+    return all_targets
 
 
 def _targets_at(state: MachineState, machine: Machine, columns: Mapping[str, Array]) -> ActuatorTargets:
     """Solve poses at all of which the machine has a place; NaN where the state of rest is not stable."""
     mechanism, count = state.mechanism, state.count
-    actuators, coordinates, senses = _actuators(machine, columns, state.free, state.joints, count)
-    names = [actuator.name for actuator in actuators]
+    all_actuators = _all_actuators(machine, columns, state.free, state.joints, count)
+    # Those that can be driven, in the order of the mechanism.
+    names = [actuator.name for actuator in all_actuators.actuators]
     places = [names.index(name) for name in mechanism.actuators]
-    actuators, unloaded, senses = [actuators[i] for i in places], coordinates[:, places], senses[:, places]
-    status = np.broadcast_to(state.free.status, (count,))
-    status = np.where(status == Status.SINGULAR, Status.SINGULAR, Status.NO_REST).astype(np.int64)
+    actuators = [all_actuators.actuators[place] for place in places]
+    unloaded, senses = all_actuators.coordinates[:, places], all_actuators.senses[:, places]
+    status_without_rest = np.where(state.free.status == Status.SINGULAR, Status.SINGULAR, Status.NO_REST)
     if not actuators:
-        return _empty_targets((), status)
+        return _empty_targets((), np.broadcast_to(status_without_rest, (count,)).astype(np.int64))
     length = mechanism.length
     # The mechanism has amounts of forward motion, in lengths of its own where an actuator slides.
     units = senses * np.where([actuator.slides for actuator in actuators], length[:, None], 1.0)
@@ -200,31 +200,39 @@ def _targets_at(state: MachineState, machine: Machine, columns: Mapping[str, Arr
         distance_corrected=where_stable(np.where(distance > ROUND_OFF_OF_ENTRY * length, distance, 0.0)),
         rotation_corrected=where_stable(np.linalg.norm(commanded.error[:, :3], axis=1)),
         rates=where_stable(commanded.rates[:, 3:] * (length[:, None] / units)[:, None]),
-        status=np.where(stable, Status.OK, status).astype(np.int64),
+        status=np.where(stable, Status.OK, status_without_rest).astype(np.int64),
     )
 
 
-def _actuators(
-    machine: Machine, columns: Mapping[str, Array], response: Response, joints: Joints | None, count: int
-) -> tuple[list[Actuator], Array, Array]:
-    """All actuators, their coordinates, and 1 where a coordinate grows as its joint moves forward, else -1.
+class _AllActuators(NamedTuple):
+    """All actuators of a machine at n poses.
 
-    Both arrays are [n x actuators].
+    Attributes:
+        actuators: the actuators.
+        coordinates: their coordinates, m or rad [n x actuators].
+        senses: 1 where a coordinate grows as its joint moves forward, else -1 [n x actuators].
     """
+
+    actuators: list[Actuator]
+    coordinates: Array
+    senses: Array
+
+
+def _all_actuators(
+    machine: Machine, columns: Mapping[str, Array], response: Response, joints: Joints | None, count: int
+) -> _AllActuators:
+    """The actuators of a family in closed form, or of legs whose joints have been found."""
     if joints is None:
         actuators = actuators_of(response.configuration)
-        senses = stacked_columns(senses_of(response.configuration), count)
-        return actuators, stacked_columns([actuator.coordinate for actuator in actuators], count), senses
-    actuators_at_homes = [
-        joint_actuators(home.chains(), leg_names(machine)) for home in _homes(machine, columns, count)
-    ]
-    actuators_at_home = actuators_at_homes[0]
-    placed = [actuator.at(joints.coordinates) for actuator in actuators_at_home]
-    signs = np.array([[actuator.sign for actuator in row] for row in actuators_at_homes])
-    senses = np.broadcast_to(signs, (count, len(placed)))
-    offsets = np.array([[actuator.offset for actuator in row] for row in actuators_at_homes])
-    offsets = offsets - [actuator.offset for actuator in actuators_at_home]
-    return placed, stacked_columns([actuator.coordinate for actuator in placed], count) + offsets, senses
+        coordinates = stacked_columns([actuator.coordinate for actuator in actuators], count)
+        return _AllActuators(actuators, coordinates, stacked_columns(senses_of(response.configuration), count))
+    at_homes = [joint_actuators(home.chains(), leg_names(machine)) for home in _homes(machine, columns, count)]
+    # Actuators are placed as those of the first home pose; others differ from them by where they count from.
+    actuators = [actuator.at(joints.coordinates) for actuator in at_homes[0]]
+    offsets = np.array([[actuator.offset for actuator in row] for row in at_homes])
+    coordinates = stacked_columns([actuator.coordinate for actuator in actuators], count) + (offsets - offsets[0])
+    signs = np.array([[actuator.sign for actuator in row] for row in at_homes])
+    return _AllActuators(actuators, coordinates, np.broadcast_to(signs, (count, len(actuators))))
 
 
 def _homes(machine: Machine, columns: Mapping[str, Array], count: int) -> list[Machine]:

@@ -27,13 +27,14 @@ from kinetostat.spec.fields import parse_range
 from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.studies.analysis import Analysis, analyze
 from kinetostat.studies.design_numbers import DesignRow, rows_at_poses, rows_over
+from kinetostat.studies.evaluation import PoseCount
 from kinetostat.studies.requirements import Verdict, requirements
 
 if TYPE_CHECKING:
     import pandas as pd
 
 MOST_DESIGNS = 12
-"""Designs that are compared: each is a column of a table."""
+"""Designs that are compared: each is a column of a table, and twice as many fit on no page."""
 OVERRIDE_SEPARATOR = ";"
 """Sign between overrides of one design."""
 _OVERRIDDEN = re.compile(r"(.+?):(\s*[A-Za-z_][\w.-]*\s*=.*)", re.DOTALL)
@@ -101,7 +102,7 @@ class Comparison(ImmutableAnswer):
             quantity.
         ranges: ranges of the grid, as written.
         where: these poses in words, "over x=-1 cm:1 cm:5"; empty without any.
-        poses: for each design, the number of poses of the grid with an answer, and that of all.
+        poses: for each design, the number of poses with an answer, and that of all; empty without any.
         over: numbers over those poses.
     """
 
@@ -112,7 +113,7 @@ class Comparison(ImmutableAnswer):
     verdicts: tuple[tuple[Verdict | None, ...], ...] = ()
     ranges: tuple[str, ...] = ()
     where: str = ""
-    poses: tuple[tuple[int, int], ...] = ()
+    poses: tuple[PoseCount, ...] = ()
     over: tuple[DesignRow, ...] = ()
 
     def to_pandas(self) -> "pd.DataFrame":
@@ -181,23 +182,23 @@ def compare(
         raise InputError(
             f"compare takes 2 to {MOST_DESIGNS} designs, not {len(designs)}; give files, names or NAME:path=value."
         )
-    read_designs = list(_designs(designs))
+    analysed = tuple(_analysed_designs(designs))
     if ranges and poses is not None:
         raise InputError("the poses come from a list or from ranges, not from both; leave one of them out.")
-    for design in read_designs:
+    for design in analysed:
         _refuse_absent(design, ranges)
-    analyses, names, where = [design.analysis for design in read_designs], as_list(quantities), ""
+    analyses, names, where = [design.analysis for design in analysed], as_list(quantities), ""
     if ranges:
         where = f"over {', '.join(ranges)}"
     elif poses is not None:
         where = f"at the poses of {poses if isinstance(poses, str | Path) else 'the list'}"
     over, counts = rows_over(analyses, ranges, poses, names, progress) if where else ((), ())
     return Comparison(
-        designs=tuple(read_designs),
-        differences=_differences(read_designs),
+        designs=analysed,
+        differences=_differences(analysed),
         rows=rows_at_poses(analyses, names),
-        softest=tuple(_softest(design) for design in read_designs),
-        verdicts=_verdicts(read_designs),
+        softest=tuple(_softest(design) for design in analysed),
+        verdicts=_verdicts(analysed),
         ranges=tuple(ranges),
         where=where,
         poses=counts,
@@ -206,23 +207,28 @@ def compare(
 
 
 def _verdicts(designs: Sequence[Design]) -> tuple[tuple[Verdict | None, ...], ...]:
-    """Judge the requirements of all files for every design, of those with one name the first; a row for a condition."""
-    judged = dict[str, Any]()
+    """Judge the requirements of all files for every design: a row for each condition, a column for each design.
+
+    Of requirements with one name, that of the first design counts. A design has no verdict on a quantity that its
+    machine lacks, unless its own file requires it: then the message about it is raised.
+    """
+    requirements_by_name: dict[str, Any] = {}
     for design in designs:
-        judged = {**design.machine.requirements, **judged}
+        requirements_by_name = {**design.machine.requirements, **requirements_by_name}
     columns = []
     for design in designs:
-        column = dict[tuple[str, str], Verdict]()
-        for name, requirement in judged.items():
+        column: dict[tuple[str, str], Verdict] = {}
+        for name, requirement in requirements_by_name.items():
             try:
                 verdicts = requirements(replace(design.machine, requirements={name: requirement}))
-            except InputError:  # what it is about is nothing that this machine has
+            except InputError:
                 if name in design.machine.requirements:
                     raise
                 continue
             column |= {(name, verdict.condition): verdict for verdict in verdicts}
         columns.append(column)
-    return tuple(tuple(column.get(key) for column in columns) for key in dict.fromkeys(k for c in columns for k in c))
+    conditions = dict.fromkeys(condition for column in columns for condition in column)
+    return tuple(tuple(column.get(condition) for column in columns) for condition in conditions)
 
 
 def _refuse_absent(design: Design, ranges: Sequence[str]) -> None:
@@ -234,32 +240,37 @@ def _refuse_absent(design: Design, ranges: Sequence[str]) -> None:
             raise InputError(f"{design.label}: {error}") from None
 
 
-def _designs(given: Sequence[Design | Machine | str] | Mapping[str, Machine | str]) -> Iterator[Design]:
-    """The designs that were given, analysed; machines without a name are numbered."""
-    named = (
-        given.items() if isinstance(given, Mapping) else ((f"design {n}", design) for n, design in enumerate(given, 1))
-    )
-    for name, design in named:
-        if isinstance(design, Machine):
-            yield Design(name, design, analyze(design))
-        else:
-            read = read_design(design) if isinstance(design, str) else design
-            yield replace(read, label=name) if isinstance(given, Mapping) else read
+def _analysed_designs(designs: Sequence[Design | Machine | str] | Mapping[str, Machine | str]) -> Iterator[Design]:
+    """The designs, analysed, under the names that they are given or read by; machines without a name are numbered."""
+    if isinstance(designs, Mapping):
+        for name, design in designs.items():
+            yield replace(_analysed_design(design, name), label=name)
+    else:
+        for number, each in enumerate(designs, 1):
+            yield _analysed_design(each, f"design {number}")
+
+
+def _analysed_design(design: Design | Machine | str, name: str) -> Design:
+    """A machine under a name; a design itself; or one that is read from a text, which is its label."""
+    if isinstance(design, Machine):
+        return Design(name, design, analyze(design))
+    return read_design(design) if isinstance(design, str) else design
 
 
 def _differences(designs: Sequence[Design]) -> tuple[Difference, ...]:
     """Fields that two designs have at least, whole ones where they have entries, and of which not all say the same."""
-    numbers_of = [values(design.machine) for design in designs]
+    numbers_by_design = [values(design.machine) for design in designs]
     fields_by_design = [_whole_fields(design.machine) for design in designs]
     differences = []
     for path in dict.fromkeys(path for fields in fields_by_design for path in fields):
-        fields_of = tuple(fields.get(path) for fields in fields_by_design)
+        parameters_at_path = tuple(fields.get(path) for fields in fields_by_design)
         rows = tuple(
-            tuple(numbers[leaf] for leaf in p.leaves) if p else ()
-            for numbers, p in zip(numbers_of, fields_of, strict=True)
+            tuple(numbers[leaf] for leaf in parameter.leaves) if parameter else ()
+            for numbers, parameter in zip(numbers_by_design, parameters_at_path, strict=True)
         )
-        if len({(p.quantity.kind, row) for p, row in zip(fields_of, rows, strict=True) if p}) > 1:
-            differences.append(Difference(path, fields_of, rows))
+        pairs = zip(parameters_at_path, rows, strict=True)
+        if len({(parameter.quantity.kind, row) for parameter, row in pairs if parameter}) > 1:
+            differences.append(Difference(path, parameters_at_path, rows))
     return tuple(differences)
 
 
@@ -281,10 +292,11 @@ def _softest(design: Design) -> tuple[SoftDirection, ...]:
         compliant = [i for i in components if i in block and 0.0 < diagonal[i] < math.inf]
         if compliant:
             i = max(compliant, key=lambda i: diagonal[i])
-            parts = [
+            shares = [
                 (element.name, float(element_share(response, element)[i] / diagonal[i]))
                 for element in elements(response.configuration)
                 if element.stiffness != math.inf
             ]
-            softest.append(SoftDirection(COMPONENTS[i], tuple(sorted(parts, key=lambda part: -part[1]))))
+            greatest_first = tuple(sorted(shares, key=lambda name_and_share: -name_and_share[1]))
+            softest.append(SoftDirection(COMPONENTS[i], greatest_first))
     return tuple(softest)

@@ -38,6 +38,8 @@ LAST_MODE_OF_CURVES = 6
 """Number of the mode up to which curves reach, of a machine that has so many: a rigid platform has six."""
 CURVE_POINTS = 1200
 """Points of each curve: some 300 in a decade, so that five lie within the width of a peak of 2 % damping."""
+WRENCH = dict(zip(("mx", "my", "mz", "fx", "fy", "fz"), COMPONENTS, strict=True))
+"""Names of moments and forces at the tool point, and the components along which they act."""
 
 
 @former_names(standing="motors_still", slowest="least_damped")
@@ -130,35 +132,34 @@ def servo(machine: Machine | MachineState, along: Sequence[float] = ()) -> Servo
 
 def _with_loops(vibration: Vibration, closed: ClosedLoops) -> Servo:
     """The answer for a machine whose modes with motors that stand still are known."""
-    parts = list(vibration.machine.family.components)
-    compliance_motors_still = closed.modes.tool @ closed.modes.tool.T
+    components = list(vibration.machine.family.components)
+    with_motors_still = np.diag(closed.modes.tool @ closed.modes.tool.T)[components]
+    at_0_hz = np.diag(closed.receptance(np.zeros(1))[0].real)[components]
     answer = Servo(
         state=vibration.state,
         status=Status.OK,
         message="",
         loops=closed,
-        motors_still=_free_stiffness(compliance_motors_still, compliance_motors_still, parts),
-        static=_free_stiffness(closed.receptance(np.zeros(1))[0].real, compliance_motors_still, parts),
+        motors_still=_free_stiffness(with_motors_still, with_motors_still),
+        static=_free_stiffness(at_0_hz, with_motors_still),
         poles=closed.poles(),
         stable=closed.stable,
         assumed=vibration.assumed,
     )
     frequencies = answer.frequencies
-    sizes = np.abs(closed.receptance(frequencies))[:, parts, parts]
-    round_off = UNFELT * np.diag(compliance_motors_still)[parts]
-    least = [
-        (math.inf if row.max() <= limit else 1.0 / row.max(), frequencies[row.argmax()])
-        for row, limit in zip(sizes.T, round_off, strict=True)
-    ]
+    receptance = np.abs(closed.receptance(frequencies))[:, components, components]
+    least_stiffness = _free_stiffness(receptance.max(axis=0), with_motors_still)
     answer = replace(
-        answer, least=np.array(least), least_damped=least_damped_pole(answer.poles, (0.0, float(frequencies[-1])))
+        answer,
+        least=np.stack([least_stiffness, frequencies[receptance.argmax(axis=0)]], axis=1),
+        least_damped=least_damped_pole(answer.poles, (0.0, float(frequencies[-1]))),
     )
     return replace(answer, message=_message(answer))
 
 
-def _free_stiffness(compliance: Array, compliance_motors_still: Array, parts: Sequence[int]) -> Array:
-    """Reciprocals of a diagonal [6 x 6]; infinite if it is round-off beside that with motors that stand still."""
-    pairs = [(float(compliance[i, i]), float(compliance_motors_still[i, i])) for i in parts]
+def _free_stiffness(compliance: Array, with_motors_still: Array) -> Array:
+    """Reciprocals of compliances [n]; infinite for one that is round-off beside that with motors that stand still."""
+    pairs = zip(compliance.tolist(), with_motors_still.tolist(), strict=True)
     return np.array([math.inf if abs(entry) <= UNFELT * still else 1.0 / entry for entry, still in pairs])
 
 
@@ -175,10 +176,6 @@ def _message(answer: Servo) -> str:
     frequency, ratio = answer.least_damped
     damping = f"{100.0 * ratio:.3g} % of critical damping"
     return f"The loops are stable; the least damped motion has {show(frequency, 'Hz')} and {damping}."
-
-
-WRENCH = dict(zip(("mx", "my", "mz", "fx", "fy", "fz"), COMPONENTS, strict=True))
-"""Names of moments and forces at the tool point, and the components along which they act."""
 
 
 @dataclass(frozen=True)
@@ -247,9 +244,9 @@ def state_space(
     solution, damping = vibration.solution, vibration.damping
     if count is not None and count < 1:
         raise InputError(f"count is {count}; a state space has one mode or more: give a positive number.")
-    forces = {name: part for name, part in WRENCH.items() if part in vibration.components}
+    forces = {name: component for name, component in WRENCH.items() if component in vibration.components}
     input_ports, input_modes = _ports(solution, forces, ("N·m", "N"), "input", inputs)
-    motions = {part: part for part in vibration.components}
+    motions = {component: component for component in vibration.components}
     output_ports, output_modes = _ports(solution, motions, ("rad", "m"), "output", outputs)
     kept = solution.mode_count if count is None else min(count, solution.mode_count)
     return StateSpace(
@@ -264,7 +261,7 @@ def state_space(
 
 
 def _ports(
-    solution: Modes, tool: Mapping[str, str], units: tuple[str, str], what: str, wanted: Sequence[str] | None
+    solution: Modes, tool: Mapping[str, str], units: tuple[str, str], role: str, wanted: Sequence[str] | None
 ) -> tuple[tuple[Port, ...], Array]:
     """The chosen inputs or outputs, and how each moves in all modes [ports x modes].
 
@@ -272,13 +269,15 @@ def _ports(
         solution: the modes.
         tool: names of the ports at the tool point, with the component of each.
         units: units of ports that turn and of those that slide.
-        what: "input" or "output", for messages.
+        role: "input" or "output", for messages.
         wanted: names of the ports that are chosen; those at the tool point if None.
     """
     turning, sliding = units
-    rows = {name: COMPONENTS.index(part) for name, part in tool.items()}
-    known = {name: (turning if row < 3 else sliding, solution.tool[row]) for name, row in rows.items()}
-    known |= {drive.name: (turning if drive.turning else sliding, drive.motion) for drive in solution.drives}
-    names = [choice(name, known, what) for name in (tool if wanted is None else wanted)]
-    ports = tuple(Port(name, known[name][0]) for name in names)
-    return ports, np.array([known[name][1] for name in names]).reshape(len(names), len(solution.inverse_squares))
+    rows = {name: COMPONENTS.index(component) for name, component in tool.items()}
+    motions = {name: solution.tool[row] for name, row in rows.items()}
+    motions |= {drive.name: drive.motion for drive in solution.drives}
+    unit_by_name = {name: turning if row < 3 else sliding for name, row in rows.items()}
+    unit_by_name |= {drive.name: turning if drive.turning else sliding for drive in solution.drives}
+    names = [choice(name, motions, role) for name in (tool if wanted is None else wanted)]
+    ports = tuple(Port(name, unit_by_name[name]) for name in names)
+    return ports, np.array([motions[name] for name in names]).reshape(len(names), len(solution.inverse_squares))

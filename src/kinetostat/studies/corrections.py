@@ -12,7 +12,7 @@ law is exact, and polynomials of ever higher degree are fitted until one is good
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations_with_replacement
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -52,8 +52,27 @@ MOST_TABLE_POINTS = 200_000
 GOOD_ENOUGH = 1e-3
 """Share of the error without corrections that a law may leave, if no tolerance is given."""
 
-Term: TypeAlias = tuple[tuple[str, int], ...]
-"""For each axis the function of it: ("power", k), ("cos", k) or ("sin", k)."""
+
+class AxisFunction(NamedTuple):
+    """A function of the values of one axis.
+
+    Attributes:
+        kind: "power" of the value, whose range is brought to -1 to 1; or "cos" or "sin" of a multiple of the angle.
+        order: exponent of the power, or factor of the angle.
+    """
+
+    kind: str
+    order: int
+
+    def at(self, values: Array, middle: float, half: float) -> Array:
+        """The function at values of the axis [n], whose range has this middle and this half width."""
+        if self.kind == "power":
+            return np.asarray(((values - middle) / half) ** self.order)
+        return np.asarray((np.cos if self.kind == "cos" else np.sin)(self.order * values))
+
+
+Term: TypeAlias = tuple[AxisFunction, ...]
+"""A product of functions, one of each axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +81,8 @@ class Law(ImmutableAnswer):
 
     Attributes:
         paths: paths of the fields.
-        middles, halves: middle and half width of the range of each; powers are those of (value - middle) / half.
-        terms: each term, a product over the axes.
+        middles, halves: middle and half width of the range of each.
+        terms: the terms.
         coefficients: factor of each term in each correction, m or rad [terms x actuators].
     """
 
@@ -83,11 +102,8 @@ def _functions(terms: Sequence[Term], values: Sequence[Array], middles: Array, h
     columns = []
     for term in terms:
         column = np.ones(len(values[0]))
-        for (kind, k), axis, middle, half in zip(term, values, middles, halves, strict=True):
-            if kind == "power":
-                column = column * ((axis - middle) / half) ** k
-            else:
-                column = column * (np.cos(k * axis) if kind == "cos" else np.sin(k * axis))
+        for function, axis, middle, half in zip(term, values, middles, halves, strict=True):
+            column = column * function.at(axis, middle, half)
         columns.append(column)
     return np.stack(columns, axis=1)
 
@@ -139,7 +155,13 @@ def _without_round_off(law: Law) -> Law:
 
 
 def _candidates(paths: Sequence[str], counts: Sequence[int], known: int) -> Iterator[tuple[Term, ...]]:
-    """Lists of terms, the shortest first and harmonics before powers; each with fewer terms than points."""
+    """Lists of terms, the shortest first and harmonics before powers; none has more terms than there are corrections.
+
+    Args:
+        paths: paths of the fields.
+        counts: number of points along each axis.
+        known: number of points with a correction.
+    """
     with_powers: list[tuple[Term, ...]] = []
     with_harmonics: list[tuple[Term, ...]] = []
     turning = paths.index(GRAVITY_ANGLE) if GRAVITY_ANGLE in paths else None
@@ -162,13 +184,14 @@ def _powers(counts: Sequence[int], axes: Sequence[int], degree: int) -> tuple[Te
         for chosen in combinations_with_replacement(axes, size):
             powers = [chosen.count(axis) for axis in range(len(counts))]
             if all(power < count for power, count in zip(powers, counts, strict=True)):
-                terms.append(tuple(("power", power) for power in powers))
+                terms.append(tuple(AxisFunction("power", power) for power in powers))
     return tuple(terms)
 
 
 def _with_harmonics(terms: Sequence[Term], axis: int, harmonics: int) -> tuple[Term, ...]:
-    """The terms, each also times cosine and sine of multiples of the angle."""
-    waves = [("power", 0), *((kind, k) for k in range(1, harmonics + 1) for kind in ("cos", "sin"))]
+    """The terms, each also times cosine and sine of multiples of the angle, which is an axis without powers in them."""
+    harmonics_of_angle = (AxisFunction(kind, k) for k in range(1, harmonics + 1) for kind in ("cos", "sin"))
+    waves = [AxisFunction("power", 0), *harmonics_of_angle]
     return tuple((*term[:axis], wave, *term[axis + 1 :]) for term in terms for wave in waves)
 
 
@@ -259,9 +282,9 @@ def correction_table(
     # Together, so that a table whose cells have no place is still a table.
     of_cells = middles.columns(0, middles.size)
     columns = {path: np.concatenate([values, of_cells[path]]) for path, values in grid.columns(0, grid.size).items()}
-    answers = actuator_targets(machine, columns, grid.size + middles.size, progress)
+    nodes, cells = actuator_targets(machine, columns, grid.size + middles.size, progress).split(grid.size)
     fields = tuple(parameter for _, parameter in pairs)
-    return _table_of(machine, fields, grid, middles, answers.split(grid.size), greatest_error)
+    return _table_of(machine, fields, grid, middles, nodes, cells, greatest_error)
 
 
 def _table_of(
@@ -269,28 +292,33 @@ def _table_of(
     fields: tuple[Parameter, ...],
     grid: Grid,
     middles: Grid,
-    answers: Sequence[ActuatorTargets],
+    nodes: ActuatorTargets,
+    cells: ActuatorTargets,
     wanted: float | None,
 ) -> CorrectionTable:
-    """The table with its errors and its law, of what is solved at points and at middles of cells."""
-    nodes, cells = answers
+    """The table with its errors and its law.
+
+    Args:
+        machine: the machine with its loads.
+        fields: fields of the axes.
+        grid, middles: the points of the table, and the middles of its cells.
+        nodes, cells: what is solved at the points, and at the middles.
+        wanted: greatest error of the law, m; None for a share of the error without corrections.
+    """
     if not nodes.settled.any():
         raise InputError(f"{machine.name}: {without_command(machine, grid.columns(0, grid.size), nodes.status)}")
     axes, points, points_of_cells = tuple(axis.values for axis in grid.axes), _points(grid), _points(middles)
     errors = _errors(cells, _at_middles(nodes.corrections, grid.shape))
     largest = float(np.nanmax(errors)) if np.isfinite(errors).any() else float("nan")
     unknown = int((~np.isfinite(errors)).sum())
-    uncorrected, of_exact = (
-        float(np.nanmax(np.concatenate([getattr(nodes, name), getattr(cells, name)])))
-        for name in ("distance_uncorrected", "distance_corrected")
-    )
+    uncorrected = _largest(nodes.distance_uncorrected, cells.distance_uncorrected)
+    of_exact = _largest(nodes.distance_corrected, cells.distance_corrected)
     tolerance = GOOD_ENOUGH * uncorrected if wanted is None else wanted
 
-    def error(law: Law) -> float:
-        ends = [_errors(nodes, law.at(points)), _errors(cells, law.at(points_of_cells))]
-        return float(np.nanmax(np.concatenate(ends)))
+    def error_of(law: Law) -> float:
+        return _largest(_errors(nodes, law.at(points)), _errors(cells, law.at(points_of_cells)))
 
-    law, law_error = shortest_law([field.path for field in fields], axes, nodes.corrections, error, tolerance)
+    law, law_error = shortest_law([field.path for field in fields], axes, nodes.corrections, error_of, tolerance)
     missing = ""
     if unknown:
         reasons = tally(np.concatenate([nodes.status, cells.status]))
@@ -311,6 +339,11 @@ def _table_of(
     )
 
 
+def _largest(at_nodes: Array, at_cells: Array) -> float:
+    """The largest of some errors at points and at middles of cells; NaN, where there is no command, does not count."""
+    return float(np.nanmax(np.concatenate([at_nodes, at_cells])))
+
+
 def _points(grid: Grid) -> tuple[Array, ...]:
     """The values of each axis at all points of a grid."""
     columns = grid.columns(0, grid.size)
@@ -320,8 +353,8 @@ def _points(grid: Grid) -> tuple[Array, ...]:
 def _at_middles(values: Array, shape: Sequence[int]) -> Array:
     """Values at the points of a grid, interpolated linearly at the middles of its cells [n x k] -> [cells x k]."""
     table = values.reshape(*shape, -1)
-    for axis in range(len(shape)):
-        ahead, behind = (np.take(table, range(first, shape[axis] - 1 + first), axis) for first in (1, 0))
+    for axis, count in enumerate(shape):
+        behind, ahead = (np.take(table, range(first, count - 1 + first), axis) for first in (0, 1))
         table = 0.5 * (ahead + behind)
     return table.reshape(-1, values.shape[1])
 
@@ -340,8 +373,7 @@ def _message(machine: Machine, uncorrected: float, of_exact: float, error: float
         )
     sentences = [f"Without corrections the tool point is off by at most {show(uncorrected, 'm')}."]
     if np.isfinite(error):
-        sentences.append(
-            f"Interpolated linearly, the table leaves at most {show(error, 'm')} (at the middles of its cells)"
-            + (f", beside the {show(of_exact, 'm')} that no actuator can change." if of_exact > 0.0 else ".")
-        )
+        beside = f", beside the {show(of_exact, 'm')} that no actuator can change" if of_exact > 0.0 else ""
+        interpolated = f"Interpolated linearly, the table leaves at most {show(error, 'm')}"
+        sentences.append(f"{interpolated} (at the middles of its cells){beside}.")
     return " ".join([*sentences, missing]).rstrip()

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from enum import StrEnum
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from kinetostat.machine.parameters import Parameter
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import Analysis
 from kinetostat.studies.budget import budget
-from kinetostat.studies.evaluation import point_of_file
+from kinetostat.studies.evaluation import PoseCount, point_of_file
 from kinetostat.studies.poses import chosen_axes, given_poses, grid_of
 from kinetostat.studies.quantities import cable_count, refuse_absent, resolve_quantities
 from kinetostat.tolerances import EQUAL_DESIGNS
@@ -117,34 +117,34 @@ def _matrix_rows(analyses: Sequence[Analysis]) -> Iterator[DesignRow]:
 
 def _index_rows(analyses: Sequence[Analysis]) -> Iterator[DesignRow]:
     """Least stiffnesses, condition, singularity margin and moving mass."""
-    scalars: list[tuple[str, str, Better, Callable[[Analysis], float | None]]] = [
-        ("least stiffness, force", "N/m", Better.MORE, lambda analysis: _least(analysis, "translation")),
-        ("least stiffness, moment", "N·m/rad", Better.MORE, lambda analysis: _least(analysis, "rotation")),
-        ("condition of K", "1", Better.LESS, _condition),
-        ("singularity margin", "1", Better.MORE, lambda analysis: analysis.singularity_margin),
-        ("moving mass", "kg", Better.LESS, lambda analysis: analysis.moving_mass),
-    ]
-    for name, unit, better, value in scalars:
-        numbers = tuple(value(analysis) if analysis.status is Status.OK else None for analysis in analyses)
-        yield DesignRow(group="indices", name=name, unit=unit, better=better, values=numbers)
+    row = partial(_row_at_pose, analyses, "indices")
+    yield row("least stiffness, force", "N/m", Better.MORE, lambda each: _least_stiffness(each, "translation"))
+    yield row("least stiffness, moment", "N·m/rad", Better.MORE, lambda each: _least_stiffness(each, "rotation"))
+    yield row("condition of K", "1", Better.LESS, _condition)
+    yield row("singularity margin", "1", Better.MORE, lambda each: each.singularity_margin)
+    yield row("moving mass", "kg", Better.LESS, lambda each: each.moving_mass)
 
 
 def _load_and_vibration_rows(analyses: Sequence[Analysis]) -> Iterator[DesignRow]:
     """Numbers that only designs have whose files give masses, a cut, loads or tolerances."""
-    rows: list[tuple[str, str, Better, Callable[[Machine], str]]] = [
-        ("first natural frequency", "Hz", Better.MORE, _name_of_frequency),
-        ("stable width of cut", "m", Better.MORE, lambda _: "stable_width"),
-        (
-            "displacement under load",
-            "m",
-            Better.LESS,
-            lambda machine: DISPLACEMENT if platform_is_loaded(machine) else "",
-        ),
-        ("error as built, 95 %", "m", Better.LESS, lambda machine: BUILT_ERROR if machine.tolerances else ""),
-    ]
-    for title, unit, better, name_of in rows:
-        numbers = tuple(_at_pose(analysis.state, name_of(analysis.state.machine)) for analysis in analyses)
-        yield DesignRow(group="loads and vibration", name=title, unit=unit, better=better, values=numbers)
+    row = partial(_row_at_pose, analyses, "loads and vibration")
+    yield row("first natural frequency", "Hz", Better.MORE, _frequency)
+    yield row("stable width of cut", "m", Better.MORE, lambda each: _at_pose(each.state, "stable_width"))
+    yield row("displacement under load", "m", Better.LESS, _displacement_under_load)
+    yield row("error as built, 95 %", "m", Better.LESS, _built_error)
+
+
+def _row_at_pose(
+    analyses: Sequence[Analysis],
+    group: str,
+    name: str,
+    unit: str,
+    better: Better,
+    number: Callable[[Analysis], float | None],
+) -> DesignRow:
+    """The row of a number that an analysis gives; None for a design whose pose has no answer."""
+    numbers = tuple(number(each) if each.status is Status.OK else None for each in analyses)
+    return DesignRow(group=group, name=name, unit=unit, better=better, values=numbers)
 
 
 def _quantity_rows(analyses: Sequence[Analysis], quantities: Sequence[str]) -> Iterator[DesignRow]:
@@ -166,29 +166,36 @@ def _diagonal(analysis: Analysis, group: str, name: str) -> float | None:
     return dict(zip(analysis.components, diagonal, strict=False)).get(name)
 
 
-def _least(analysis: Analysis, block: str) -> float | None:
+def _least_stiffness(analysis: Analysis, block: str) -> float | None:
     """The least principal stiffness of a block, with the motions of the other block free."""
-    blocks = analysis.indices.free if analysis.indices else None
-    return {str(name): block_values.stiffnesses[0] for name, block_values in (blocks or {}).items()}.get(block)
+    blocks = (analysis.indices.free if analysis.indices else None) or {}
+    return float(blocks[block].stiffnesses[0]) if block in blocks else None
 
 
 def _condition(analysis: Analysis) -> float | None:
-    value = analysis.indices.stiffness_condition if analysis.indices else math.inf
-    return value if math.isfinite(value) else None
+    condition = analysis.indices.stiffness_condition if analysis.indices else math.inf
+    return condition if math.isfinite(condition) else None
 
 
 def _number_or_none(value: float) -> float | None:
     return None if math.isnan(value) else float(value)
 
 
-def _name_of_frequency(machine: Machine) -> str:
-    return "loaded_frequency_1" if machine.loaded else "frequency_1"
+def _frequency(analysis: Analysis) -> float | None:
+    machine = analysis.state.machine
+    return _at_pose(analysis.state, "loaded_frequency_1" if machine.loaded else "frequency_1")
+
+
+def _displacement_under_load(analysis: Analysis) -> float | None:
+    return _at_pose(analysis.state, DISPLACEMENT) if platform_is_loaded(analysis.state.machine) else None
+
+
+def _built_error(analysis: Analysis) -> float | None:
+    return _at_pose(analysis.state, BUILT_ERROR) if analysis.state.machine.tolerances else None
 
 
 def _at_pose(state: MachineState, name: str) -> float | None:
-    """A number of a machine at its pose; None without a name, or where the file does not give what the number needs."""
-    if not name or state.status is not Status.OK:
-        return None
+    """A number of a machine at its pose, which has an answer; None where the file does not give what it needs."""
     machine = state.machine
     try:
         refuse_absent(state, _quantities_of(machine, name))
@@ -206,15 +213,20 @@ def _quantities_of(machine: Machine, name: str) -> list[str]:
 
 
 def _names_by_design(
-    analyses: Sequence[Analysis], given: Sequence[str], varied: Sequence[Sequence[Parameter]] = ()
+    analyses: Sequence[Analysis], wanted: Sequence[str], varied: Sequence[Sequence[Parameter]] = ()
 ) -> list[list[str]]:
-    """For each design, those of the given names that mean something for it; groups stand for their members.
+    """For each design, those of the wanted names that mean something for it; groups stand for their members.
+
+    Args:
+        analyses: the analyses of the designs.
+        wanted: names of quantities or groups, or of `NUMBERS_BESIDE_QUANTITIES`.
+        varied: for each design, the fields that vary over poses; empty for the poses of the files.
 
     Raises:
         InputError: a name that means nothing for any of the designs.
     """
     result: list[list[str]] = [[] for _ in analyses]
-    for name in given:
+    for name in wanted:
         refusals = []
         for place, analysis in enumerate(analyses):
             machine = analysis.state.machine
@@ -240,23 +252,21 @@ def _numbers_of(
 ) -> tuple[dict[str, Array], Array]:
     """Numbers at points by name [points], NaN where there is none, and whether each point has a result [points]."""
     quantities = [name for name in names if name not in NUMBERS_BESIDE_QUANTITIES]
+    components = _quantities_of(machine, DISPLACEMENT) if DISPLACEMENT in names else []
+    # Without any quantity, the margin alone says which points have a result.
+    evaluated = [*dict.fromkeys([*quantities, *components])] or ["singularity_margin"]
+    evaluation = evaluate(machine, points, evaluated, progress)
+    has_result = evaluation.status == Status.OK
+    numbers = {name: evaluation.values[name] for name in quantities}
     if DISPLACEMENT in names:
-        quantities += _quantities_of(machine, DISPLACEMENT)
-    evaluation = evaluate(machine, points, [*dict.fromkeys(quantities)] or ["singularity_margin"], progress)
-    answered, result = evaluation.status == Status.OK, dict[str, Array]()
-    for name in names:
-        if name == DISPLACEMENT:
-            components = {each: QUANTITIES[each].components for each in _quantities_of(machine, DISPLACEMENT)}
-            translations = [each for each, (component,) in components.items() if not component.startswith("r")]
-            result[name] = np.linalg.norm([evaluation.values[each] for each in translations], axis=0)
-        elif name == BUILT_ERROR:
-            result[name] = np.full(points.size, np.nan)
-            if answered.any():
-                errors = budget(machine, points.columns(0, points.size))
-                result[name][errors.settled] = errors.size("usual", "position")[errors.settled]
-        else:
-            result[name] = evaluation.values[name]
-    return result, answered
+        translations = [each for each in components if not QUANTITIES[each].components[0].startswith("r")]
+        numbers[DISPLACEMENT] = np.linalg.norm([evaluation.values[each] for each in translations], axis=0)
+    if BUILT_ERROR in names:
+        numbers[BUILT_ERROR] = np.full(points.size, np.nan)
+        if has_result.any():
+            errors = budget(machine, points.columns(0, points.size))
+            numbers[BUILT_ERROR][errors.settled] = errors.size("usual", "position")[errors.settled]
+    return {name: numbers[name] for name in names}, has_result
 
 
 def _unit_and_better(name: str) -> tuple[str, Better | None]:
@@ -267,10 +277,21 @@ def _unit_and_better(name: str) -> tuple[str, Better | None]:
     return quantity.unit, Better(quantity.better) if quantity.better else None
 
 
+class _Spread(NamedTuple):
+    """Statistics of a number over poses: its worst value, `PERCENTILE` towards it, and its mean.
+
+    Where neither less nor more is better, the worst value is the greatest in size, and the percentile is one of sizes.
+    """
+
+    worst: float
+    percentile: float
+    mean: float
+
+
 def rows_over(
     analyses: Sequence[Analysis], ranges: Sequence[str], poses: Any, quantities: Sequence[str], progress: Progress
-) -> tuple[tuple[DesignRow, ...], tuple[tuple[int, int], ...]]:
-    """Compute the worst value, a percentile and the mean over poses; and for each design (poses answered, all poses).
+) -> tuple[tuple[DesignRow, ...], tuple[PoseCount, ...]]:
+    """Compute the worst value, a percentile and the mean over poses, and for each design the number of poses.
 
     Args:
         analyses: the analyses of the designs.
@@ -285,28 +306,31 @@ def rows_over(
     machines = [analysis.state.machine for analysis in analyses]
     points_and_fields = [_points_of(machine, ranges, poses) for machine in machines]
     names = _names_by_design(analyses, quantities or USUAL_QUANTITIES, [fields for _, fields in points_and_fields])
-    spreads: list[dict[str, tuple[float, ...]]] = []
+    spreads: list[dict[str, _Spread]] = []
     counts = []
-    total = sum(points.size for points, _ in points_and_fields)
-    done = 0
-    for machine, (points, _), wanted in zip(machines, points_and_fields, names, strict=True):
-        numbers, answered = _numbers_of(machine, points, wanted, partial(_progress_after, progress, done, total))
-        counts.append((int(answered.sum()), points.size))
-        finite_rows = {name: row[answered & ~np.isnan(row)] for name, row in numbers.items()}
-        spreads.append({name: _spread(_unit_and_better(name)[1], row) for name, row in finite_rows.items() if row.size})
+    total, done = sum(points.size for points, _ in points_and_fields), 0
+    for machine, (points, _), names_of_design in zip(machines, points_and_fields, names, strict=True):
+        progress_of_design = partial(_progress_after, progress, done, total)
+        numbers, has_result = _numbers_of(machine, points, names_of_design, progress_of_design)
+        counts.append(PoseCount(answered=int(has_result.sum()), total=points.size))
+        known = {name: row[has_result & ~np.isnan(row)] for name, row in numbers.items()}
+        spreads.append({name: _spread(_unit_and_better(name)[1], row) for name, row in known.items() if row.size})
         done += points.size
         progress(done, total)
     rows = []
-    for name in dict.fromkeys(name for wanted in names for name in wanted):
+    for name in dict.fromkeys(name for names_of_design in names for name in names_of_design):
         unit, better = _unit_and_better(name)
         group = name.replace("compliance_", "C_") if name in GROUPS["compliance"] else name.replace("_", " ")
-        for k, statistic in enumerate(("worst" if better else "greatest in size", f"{PERCENTILE:g} %", "mean")):
-            values_of_designs = tuple(spread[name][k] if name in spread else None for spread in spreads)
-            rows.append(DesignRow(group=group, name=statistic, unit=unit, better=better, values=values_of_designs))
+        titles = ("worst" if better else "greatest in size", f"{PERCENTILE:g} %", "mean")
+        for statistic, title in zip(_Spread._fields, titles, strict=True):
+            numbers_of_designs = tuple(
+                getattr(spread[name], statistic) if name in spread else None for spread in spreads
+            )
+            rows.append(DesignRow(group=group, name=title, unit=unit, better=better, values=numbers_of_designs))
     return tuple(rows), tuple(counts)
 
 
-def _progress_after(progress: Progress, before: int, total: int, done: int, _part: int) -> None:
+def _progress_after(progress: Progress, before: int, total: int, done: int, _total_of_part: int) -> None:
     """Report the progress of a part of the work as that of the whole."""
     progress(before + done, total)
 
@@ -320,13 +344,14 @@ def _points_of(machine: Machine, ranges: Sequence[str], poses: Any) -> tuple[Poi
     return PointTable(columns.leaves), list(columns.fields)
 
 
-def _spread(better: Better | None, row: Array) -> tuple[float, ...]:
-    """Return the worst value, a percentile towards it, and the mean; if none is better, the greatest in size."""
+def _spread(better: Better | None, row: Array) -> _Spread:
+    """The statistics of some values, of at least one."""
+    mean = float(row.mean())
     if better is None:
-        return float(row[np.abs(row).argmax()]), _percentile(np.abs(row), PERCENTILE), float(row.mean())
+        return _Spread(float(row[np.abs(row).argmax()]), _percentile(np.abs(row), PERCENTILE), mean)
     if better is Better.MORE:
-        return float(row.min()), _percentile(row, 100.0 - PERCENTILE), float(row.mean())
-    return float(row.max()), _percentile(row, PERCENTILE), float(row.mean())
+        return _Spread(float(row.min()), _percentile(row, 100.0 - PERCENTILE), mean)
+    return _Spread(float(row.max()), _percentile(row, PERCENTILE), mean)
 
 
 def _percentile(row: Array, percent: float) -> float:

@@ -8,7 +8,7 @@ Source: theory (99).
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,13 +16,11 @@ from kinetostat.arrays import Array, Codes, Mask
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.moving import PathForces, RigidForm, forces_on_path
 from kinetostat.engine.points import PointTable
-from kinetostat.equilibrium.state import MachineState, state_of, states_at
+from kinetostat.equilibrium.state import MachineState, state_of
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import REGULAR, Status
 from kinetostat.kinetostatics.drive_limits import driven_springs
-from kinetostat.machine.actuators import actuators_of, joint_actuators, name_of, numbers_of_drive, rotor_turns
-from kinetostat.machine.column import stacked_columns
+from kinetostat.machine.actuators import name_of, numbers_of_drive, rotor_turns
 from kinetostat.machine.leg import Spring
 from kinetostat.machine.machine import Machine
 from kinetostat.motion.forces import PARTS
@@ -32,7 +30,7 @@ from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.renamed import former_names
-from kinetostat.studies.dynamics import places_of_drives, rigid_form_of, senses_of_drives
+from kinetostat.studies.dynamics import coordinates_of_drives, rigid_form_of, senses_of_drives
 from kinetostat.studies.motion_deflection import ModesAlong, deflections, modes_along
 from kinetostat.studies.motions import Motion, read_motion, required_motion
 from kinetostat.studies.worst_directions import every_direction
@@ -43,6 +41,27 @@ MOST_NAMED = 3
 """Drives that a sentence names."""
 PASSABLE = (*REGULAR, Status.UNDECIDED)
 """Statuses of poses at which drives have forces: limits of the file are compared with, but stop no motion."""
+
+
+class MotorPower(NamedTuple):
+    """Greatest power of a motor, W, and the least: negative where it brakes, else 0."""
+
+    greatest: float
+    least: float
+
+
+class MotorEnergy(NamedTuple):
+    """Energy that a motor gives in a motion, less what it takes back, and what it takes back while it brakes, J."""
+
+    net: float
+    braking: float
+
+
+class WorstPoint(NamedTuple):
+    """Number of a point of a motion, and name of the drive that is loaded most there."""
+
+    point: int
+    drive: str
 
 
 @dataclass(frozen=True)
@@ -60,9 +79,8 @@ class DriveLoad:
         rms_force: root of the mean square of the force over time.
         parts: greatest size of each part of the force, by name, see `motion.forces.PARTS`.
         motor_speed, motor_torque, rms_torque: values at the motor, rad/s and N·m; of a linear motor m/s and N.
-        power: greatest power of the motor, W, and the least, which is negative where it brakes.
-        energy: net energy of the motor in the whole motion, J: what it gives, less what it takes
-            back; and the energy that it takes back while it brakes, J.
+        power: its motor's greatest and least power.
+        energy: its motor's energy in the whole motion; NaN where no time passes.
         reflected: greatest inertia that the motor accelerates beside its rotor, while the other drives stand still:
             kg·m², or kg of a linear motor; None where drives cannot move one by one.
         inertia_ratio: ratio of that inertia to the rotor's; None without a rotor.
@@ -81,8 +99,8 @@ class DriveLoad:
     motor_speed: float
     motor_torque: float
     rms_torque: float
-    power: tuple[float, float]
-    energy: tuple[float, float]
+    power: MotorPower
+    energy: MotorEnergy
     reflected: float | None
     inertia_ratio: float | None
 
@@ -141,7 +159,7 @@ class DriveLoads(ImmutableAnswer):
         joints: the load of each joint.
         curves: the drives over time; None without an answer.
         deflection: quasi-static deflection of the tool point [n x 6], rad and m; NaN where K does not hold it.
-        worst: number of the point at which the drive with the greatest torque has its greatest force, and its name.
+        worst: the point at which the drive with the greatest torque of all motors has its greatest force.
         along_modes: the modes of the machine at its pose along the motion; None where they are not known.
         requirements: verdicts on the motors that the machine's file requires, where they were asked for.
     """
@@ -154,7 +172,7 @@ class DriveLoads(ImmutableAnswer):
     joints: tuple[JointLoad, ...] = ()
     curves: DriveCurves | None = None
     deflection: Array | None = None
-    worst: tuple[int, str] | None = None
+    worst: WorstPoint | None = None
     along_modes: ModesAlong | None = None
     requirements: tuple[Any, ...] = ()
 
@@ -236,10 +254,10 @@ def drive_loads(state: MachineState, form: RigidForm, motion: Motion) -> DriveLo
             'drives; give it one, e.g. --set tool.mass="5 kg".'
         )
     codes = evaluate(state.machine, PointTable(motion.path.columns), ["singularity_margin"]).status
-    lost = np.flatnonzero(~np.isin(codes, PASSABLE))
-    if lost.size:
-        status = Status(int(codes[lost[0]]))
-        where = f"at {motion.times[lost[0]]:.4g} s the pose is {status.phrase}"
+    impassable = np.flatnonzero(~np.isin(codes, PASSABLE))
+    if impassable.size:
+        status = Status(int(codes[impassable[0]]))
+        where = f"at {motion.times[impassable[0]]:.4g} s the pose is {status.phrase}"
         message = f"The motion cannot be followed: {where}. {status.sentence} {motion.unit_doubt}".rstrip()
         return DriveLoads(state.machine, status, message, motion)
     forces = forces_on_path(form, motion.path, joints=True)
@@ -251,34 +269,33 @@ def drive_loads(state: MachineState, form: RigidForm, motion: Motion) -> DriveLo
         for joint, load in zip(joints_of(state.configuration), forces.joints, strict=True)
     ]
     largest = max(range(len(summaries)), key=lambda k: abs(summaries[k].motor_torque))
+    message = _message(state.machine, motion, summaries) + _wrong_signs(state, curves) + _limits_passed(motion, codes)
     return DriveLoads(
         machine=state.machine,
         status=Status.OK,
-        message=_message(state.machine, motion, summaries)
-        + _wrong_signs(state, curves)
-        + _limits_passed(motion, codes),
+        message=message,
         motion=motion,
         drives=tuple(summaries),
         joints=tuple(joints),
         curves=curves,
         deflection=deflections(state.machine, motion, forces),
-        worst=(int(np.argmax(np.abs(curves.force[largest]))), summaries[largest].name),
+        worst=WorstPoint(int(np.argmax(np.abs(curves.force[largest]))), summaries[largest].name),
         along_modes=modes_along(state, form, motion, forces.wrench),
     )
 
 
-def _amount(kind: str, given: float | str | None) -> float:
-    """A speed or an acceleration, SI."""
+def _amount(kind: str, amount: float | str | None) -> float:
+    """A speed or an acceleration, SI; the platform may stand still, but without an acceleration nothing is asked."""
     quantity = Quantity(kind, "", positive=kind == "acceleration")
-    if given is None:
+    if amount is None:
         raise InputError(
             f"{kind} is not given: without a motion, drives needs the speed and the acceleration of the platform "
             f'point, e.g. {kind} = "{KINDS[kind].example}".'
         )
     try:
-        return quantity.number(given)
+        return quantity.number(amount)
     except UnitError as error:
-        raise InputError(f"{kind} is {shorten(given)}: {error}.") from None
+        raise InputError(f"{kind} is {shorten(amount)}: {error}.") from None
 
 
 def _moment(load: Array, turns: bool, length: float) -> float | None:
@@ -292,37 +309,23 @@ def _moment(load: Array, turns: bool, length: float) -> float | None:
 def _has_forces(state: MachineState, form: RigidForm) -> bool:
     """Whether anything of the machine itself asks forces of its drives: loads, masses or friction."""
     rigid = form.at(state).rigid
-    loads = any(abs(float(part)) > 0.0 for part in rigid.process.components())
-    heavy = bool(rigid.platform) or any(leg.masses for leg in rigid.legs)
-    friction = any(drive.inertia or drive.viscous or drive.coulomb or drive.guide_friction for drive in rigid.drives)
-    return (
-        loads or heavy or friction or any(part.coulomb or part.viscous for leg in rigid.legs for part in leg.friction)
+    has_loads = any(abs(float(component)) > 0.0 for component in rigid.process.components())
+    has_masses = bool(rigid.platform) or any(leg.masses for leg in rigid.legs)
+    drives_resist = any(
+        drive.inertia or drive.viscous or drive.coulomb or drive.guide_friction for drive in rigid.drives
     )
-
-
-def _coordinates(state: MachineState, motion: Motion) -> Array:
-    """Coordinates of the drives along a motion [drives x n]."""
-    machine, count = state.machine, motion.path.size
-    with np.errstate(all="ignore"):
-        states = states_at(machine, motion.path.columns, count)
-        if states.joints is None:
-            actuators = actuators_of(states.configuration)
-        else:
-            actuators = [a.at(states.joints.coordinates) for a in joint_actuators(machine.chains(), leg_names(machine))]
-        rows = stacked_columns([actuators[place].coordinate for place in places_of_drives(state)], count).T
-    slides = np.array([spring.joint.point is None for spring in driven_springs(state.configuration)])
-    return np.where(slides[:, None], rows, np.unwrap(rows, axis=1))
+    joints_resist = any(joint.coulomb or joint.viscous for leg in rigid.legs for joint in leg.friction)
+    return has_loads or has_masses or drives_resist or joints_resist
 
 
 @dataclass(frozen=True)
 class _Motors:
-    """The motors of all drives, and how they are connected with them.
+    """The motors of all drives, and how they turn with them.
 
     Attributes:
         springs: the spring of each drive's actuator.
         numbers: the table [drives] as each drive has it.
-        turns: rotation of the rotor per unit of the drive's coordinate, rad; 1 where the motor is the drive itself
-            [drives].
+        turns: rad of the rotor per unit of the drive's coordinate; 1 where the motor is the drive itself [drives].
         rotary: whether the motor turns; that of a linear drive does where the file gives its lead [drives].
     """
 
@@ -361,7 +364,7 @@ def _curves(state: MachineState, motors: _Motors, motion: Motion, forces: PathFo
     steps = 0.5 * (power[:, 1:] + power[:, :-1]) * np.diff(motion.times)
     energy = np.concatenate([np.zeros((len(power), 1)), np.cumsum(steps, axis=1)], axis=1)
     return DriveCurves(
-        coordinate=_coordinates(state, motion),
+        coordinate=coordinates_of_drives(state, motion.path.columns, motion.path.size),
         speed=speed,
         acceleration=acceleration,
         force=force,
@@ -386,6 +389,7 @@ def _summary(k: int, motors: _Motors, motion: Motion, forces: PathForces, curves
     rotor = float(motors.numbers[k].rotor_inertia) if motors.rotary[k] else 0.0
     reflected = float(forces.inertia[k].max() / turns**2) - rotor if len(forces.inertia) else None
     braking = np.minimum(0.5 * (power[1:] + power[:-1]), 0.0) * np.diff(motion.times)
+    energy = (np.nan, np.nan) if motion.timeless else (float(curves.net_energy[k, -1]), float(-braking.sum()))
     return DriveLoad(
         name=name_of(spring),
         slides=spring.joint.point is None,
@@ -400,8 +404,8 @@ def _summary(k: int, motors: _Motors, motion: Motion, forces: PathForces, curves
         motor_speed=_size(curves.motor_speed[k]),
         motor_torque=_size(curves.motor_torque[k]),
         rms_torque=float(root_mean_square(motion.times, curves.motor_torque[k])),
-        power=(float(power.max()), float(min(power.min(), 0.0))),
-        energy=(np.nan, np.nan) if motion.timeless else (float(curves.net_energy[k, -1]), float(-braking.sum())),
+        power=MotorPower(greatest=float(power.max()), least=float(min(power.min(), 0.0))),
+        energy=MotorEnergy(*energy),
         reflected=reflected,
         inertia_ratio=reflected / rotor if reflected is not None and rotor else None,
     )
@@ -442,5 +446,5 @@ def _message(machine: Machine, motion: Motion, summaries: list[DriveLoad]) -> st
     return (
         f"{'In' if motion.timeless else 'Along'} {motion.kind}, the motors give up to "
         f"{show(strongest.motor_torque, strongest.motor_unit)} ({strongest.name}), {mean}at up to {speed}, and up to "
-        f"{max(drive.power[0] for drive in summaries):.4g} W each."
+        f"{max(drive.power.greatest for drive in summaries):.4g} W each."
     )

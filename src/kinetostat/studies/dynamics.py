@@ -4,20 +4,21 @@ Parts are rigid: springs stand still, joints and drives move (theory section 20)
 is the study `drives`; nothing here is about time.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from kinetostat.algebra.solve import Row
 from kinetostat.arrays import Array
 from kinetostat.engine.moving import RigidForm, rigid_form
-from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.equilibrium.state import MachineState, state_of, states_at
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.forward import leg_names
 from kinetostat.kinematics.status import PLACELESS
 from kinetostat.kinetostatics.drive_limits import driven_springs
-from kinetostat.machine.actuators import joint_actuators, name_of, senses_of
+from kinetostat.machine.actuators import actuators_of, joint_actuators, name_of, senses_of
+from kinetostat.machine.column import stacked_columns
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values
 from kinetostat.motion.forces import PARTS, drive_forces
@@ -53,9 +54,8 @@ class Dynamics(ImmutableAnswer):
 
     def at(self, **pose: float) -> "Dynamics":
         """The same machine at another pose, m and rad; telescopic legs keep their masses."""
-        return _dynamics(
-            MachineState(self.state.machine.with_values({f"pose.{k}": v for k, v in pose.items()})), self.form
-        )
+        there = self.state.machine.with_values({f"{POSE}{name}": value for name, value in pose.items()})
+        return _dynamics(MachineState(there), self.form)
 
     @cached_property
     def _at_pose(self) -> MachineAtPose:
@@ -101,12 +101,12 @@ class Dynamics(ImmutableAnswer):
         Raises:
             InputError: there are more drives than coordinates, so that these cannot move one by one.
         """
-        return self._over_drives([0.0] * len(self.coordinates))[0]
+        return self._over_drives([0.0] * len(self.coordinates)).mass
 
     @property
     def gravity_at_drives(self) -> Array:
         """g over the drives [drives]: N of slides, N·m of turns; errors as of `mass_at_drives`."""
-        return self._over_drives([0.0] * len(self.coordinates))[2]
+        return self._over_drives([0.0] * len(self.coordinates)).gravity
 
     @checked
     def coriolis_at_drives(self, speeds: Sequence[float]) -> Array:
@@ -116,7 +116,7 @@ class Dynamics(ImmutableAnswer):
             speeds: speeds of the drives in their order, m/s and rad/s.
         """
         self._check_square()
-        return self._over_drives(np.linalg.solve(self.jacobian, np.asarray(speeds, dtype=float)).tolist())[1]
+        return self._over_drives(np.linalg.solve(self.jacobian, np.asarray(speeds, dtype=float)).tolist()).coriolis
 
     @checked
     def forces(self, rates: Sequence[float], accelerations: Sequence[float]) -> dict[str, Array]:
@@ -154,12 +154,24 @@ class Dynamics(ImmutableAnswer):
                 "that its drives cannot move one by one; ask for M, C and g over the pose."
             )
 
-    def _over_drives(self, rates: Sequence[float]) -> tuple[Array, Array, Array]:
+    def _over_drives(self, rates: Sequence[float]) -> "_DriveEquations":
+        """M, C and g over the drives, at some rates of the coordinates of the pose."""
         self._check_square()
-        whole: tuple[list[Row], list[Row], Row] = operators(self._at_pose, self._by_name(rates)).at_drives()
-        mass, coriolis, gravity = (np.array(part, dtype=float) for part in whole)
+        mass, coriolis, gravity = operators(self._at_pose, self._by_name(rates)).at_drives()
         signs = np.outer(self.senses, self.senses)
-        return mass * signs, coriolis * signs, gravity * self.senses
+        return _DriveEquations(
+            mass=np.array(mass, dtype=float) * signs,
+            coriolis=np.array(coriolis, dtype=float) * signs,
+            gravity=np.array(gravity, dtype=float) * self.senses,
+        )
+
+
+class _DriveEquations(NamedTuple):
+    """M and C [drives x drives] and g [drives] over the coordinates of the drives."""
+
+    mass: Array
+    coriolis: Array
+    gravity: Array
 
 
 def places_of_drives(state: MachineState) -> list[int]:
@@ -176,6 +188,26 @@ def senses_of_drives(state: MachineState) -> Array:
     else:
         senses = np.array([a.sign for a in joint_actuators(state.machine.chains(), leg_names(state.machine))])
     return np.asarray(senses[places_of_drives(state)])
+
+
+def coordinates_of_drives(state: MachineState, columns: Mapping[str, Array], count: int) -> Array:
+    """Coordinates of the drives of a machine at n poses, m or rad [drives x n]; those of turns go on after a turn.
+
+    Args:
+        state: the state of the machine at its own pose.
+        columns: values of the parameters that vary, by leaf path, SI [n].
+        count: number of poses, n.
+    """
+    machine = state.machine
+    with np.errstate(all="ignore"):  # poses without a place
+        states = states_at(machine, columns, count)
+        if states.joints is None:
+            actuators = actuators_of(states.configuration)
+        else:
+            actuators = [a.at(states.joints.coordinates) for a in joint_actuators(machine.chains(), leg_names(machine))]
+        rows = stacked_columns([actuators[place].coordinate for place in places_of_drives(state)], count).T
+    slides = np.array([spring.joint.point is None for spring in driven_springs(state.configuration)])
+    return np.where(slides[:, None], rows, np.unwrap(rows, axis=1))
 
 
 @checked

@@ -53,7 +53,8 @@ def _lines(answer: DriveLoads) -> Lines:
     if names := ", ".join(answer.motion.loads):
         yield "Loads", f"The motion says {names}, in the place of what the file has there."
     yield "Worst pose", f"{name} does most at {answer.motion.times[point]:.4g} s: {_pose(answer, point)}."
-    net, braking = (sum(drive.energy[k] for drive in answer.drives) for k in range(2))
+    net = sum(drive.energy.net for drive in answer.drives)
+    braking = sum(drive.energy.braking for drive in answer.drives)
     gross = max(net + braking, 0.0)
     net = net if abs(net) > ROUND_OFF_OF_ENTRY * gross else 0.0
     text = f"All motors together give {number(gross)} J, and take back {number(braking)} J while they brake"
@@ -131,7 +132,8 @@ def _motor_table(answer: DriveLoads) -> FittedTable:
         inertia = DASH if drive.reflected is None else f"{number(drive.reflected)} {'kg·m²' if drive.rotary else 'kg'}"
         ratio = DASH if drive.inertia_ratio is None else number(drive.inertia_ratio)
         torques = (_show(answer, torque, drive.motor_unit) for torque in (drive.motor_torque, drive.rms_torque))
-        work = (f"{number(drive.power[0])} W", DASH if np.isnan(drive.energy[0]) else f"{number(drive.energy[0])} J")
+        net = DASH if np.isnan(drive.energy.net) else f"{number(drive.energy.net)} J"
+        work = (f"{number(drive.power.greatest)} W", net)
         table.add_row(drive.name, _motor_speed(drive), *torques, *work, inertia, ratio)
     return table
 
@@ -222,7 +224,7 @@ def _figures(answer: DriveLoads) -> dict[str, Drawing]:
         return {}
     if answer.motion.timeless:
         return {"speed_torque": Drawing("Torque and speed in all directions.", partial(speed_torque_figure, answer))}
-    _, name = answer.worst
+    name = answer.worst.drive
     return {
         "drives": Drawing("Speed, force and power of the drives along the motion.", partial(over_time_figure, answer)),
         "speed_torque": Drawing("Torque and speed that the motors must give.", partial(speed_torque_figure, answer)),
@@ -293,8 +295,8 @@ DRIVES = Description(
             ("load_component", "time"),
             ("nc",),
         ),
-        Field("worst_time", lambda a: None if a.worst is None else float(a.motion.times[a.worst[0]]), "s"),
-        Field("worst_drive", lambda a: None if a.worst is None else a.worst[1]),
+        Field("worst_time", lambda a: None if a.worst is None else float(a.motion.times[a.worst.point]), "s"),
+        Field("worst_drive", lambda a: None if a.worst is None else a.worst.drive),
         Field("frequency", _of_modes("frequency"), "Hz", "lowest natural frequency with motors that stand still"),
         Field("excited_modes", _of_modes("modes"), "Hz", "natural frequencies that the motion excites"),
         Field("deflection_with_modes", lambda a: a.greatest_with_modes and a.greatest_with_modes[0], "m"),
@@ -318,10 +320,15 @@ DRIVES = Description(
                 Field("motor_speed", long_name="greatest speed of the motor, rad/s or m/s"),
                 Field("motor_torque", long_name="greatest torque of the motor, N·m, or force, N"),
                 Field("rms_torque", long_name="root of the mean square of the torque or force of the motor, N·m or N"),
-                Field("power", lambda d: d.power[0], "W", "greatest power of the motor"),
-                Field("braking_power", lambda d: d.power[1], "W", "least power of the motor, where it brakes"),
-                Field("net_energy", lambda d: d.energy[0], "J", "what the motor gives, less what it takes back"),
-                Field("braking_energy", lambda d: d.energy[1], "J", "energy that the motor takes back while it brakes"),
+                Field("power", lambda d: d.power.greatest, "W", "greatest power of the motor"),
+                Field("braking_power", lambda d: d.power.least, "W", "least power of the motor, where it brakes"),
+                Field("net_energy", lambda d: d.energy.net, "J", "what the motor gives, less what it takes back"),
+                Field(
+                    "braking_energy",
+                    lambda d: d.energy.braking,
+                    "J",
+                    "energy that the motor takes back while it brakes",
+                ),
                 Field("reflected_inertia", "reflected", "", "inertia of the load at the motor, kg·m², or kg"),
                 Field("inertia_ratio", unit="1", long_name="inertia of the load over that of the rotor"),
             ),
