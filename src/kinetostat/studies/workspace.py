@@ -21,7 +21,7 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import rest_numbers
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import values
+from kinetostat.machine.parameters import POSE, values
 from kinetostat.spec.arguments import as_list, checked
 from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import ImmutableAnswer
@@ -48,6 +48,8 @@ MOST_DEMANDS = 200_000
 those of all but for a step of the grid."""
 UNIT_POWERS = {1: "", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶"}
 """Signs of the powers of a unit in the unit of a volume."""
+VOLUME_METHOD = "stratified sampling, two random points in each cell of the grid; error from their differences"
+"""The way in which volumes are estimated, for files."""
 FEWEST_CELLS = 30
 """Fewest cells from which a standard error is estimated. With fewer, both points of every cell often agree by chance,
 and the error would come out as 0."""
@@ -83,11 +85,8 @@ class Volume:
 
     @property
     def share(self) -> float:
+        """The volume as a share of the box."""
         return self.value / self.box
-
-
-METHOD = "stratified sampling, two random points in each cell of the grid; error from their differences"
-"""The way in which volumes are estimated, for files."""
 
 
 def estimate_volume(inside: Mask, unknown: Mask, sizes: Sequence[float], units: Sequence[str]) -> Volume:
@@ -166,8 +165,8 @@ class Workspace(ImmutableAnswer):
     loads_left_out: str = ""
 
     def __repr__(self) -> str:
-        of = sum(self.nodes.values())
-        return f"<Workspace of {self.machine.name!r}: {self.nodes[INSIDE]:,} of {of:,} nodes inside>"
+        total = sum(self.nodes.values())
+        return f"<Workspace of {self.machine.name!r}: {self.nodes[INSIDE]:,} of {total:,} nodes inside>"
 
     @property
     def exists(self) -> bool:
@@ -206,26 +205,26 @@ def workspace(
     machine = state.machine
     judge = Judge(state, tuple(parse_condition(text, machine.family.component_names) for text in as_list(conditions)))
     question = grid_question(state, ranges, judge.quantities)
-    _check(question)
+    _check_axes(question)
     total = question.grid.size + Cells(question.grid.axes).size
-    nodes = _nodes(question, lambda done, _: progress(done, total))
-    verdict = judge.verdicts(
-        nodes["status"].values, {name: nodes[name].values for name in judge.quantities}, partial(_poses, question)
-    )
+    nodes = _quantities_at_nodes(question, lambda done, _: progress(done, total))
+    quantities = {name: nodes[name].values for name in judge.quantities}
+    verdict = judge.verdicts(nodes["status"].values, quantities, partial(_poses_of_nodes, question))
     inside = verdict == judge.labels.index(INSIDE)
     volume = _volume(judge, question, seed, lambda done, _: progress(question.grid.size + done, total))
-    edges = borders(judge, question, verdict, _nearest(question))
-    home = _home(question)
+    border_shares = borders(judge, question, verdict, _nearest_node(question))
+    home = _home_node(question)
     connected = connected_to(inside, home) if home is not None else np.zeros_like(inside)
+    demanding_nodes = np.flatnonzero(inside)[:: 1 + int(inside.sum()) // MOST_DEMANDS]
     return Workspace(
         machine=machine,
-        dataset=_dataset(nodes, verdict, connected, judge, volume, edges),
+        dataset=_dataset(nodes, verdict, connected, judge, volume, border_shares),
         verdicts=judge.labels,
-        nodes={label: int((verdict == i).sum()) for i, label in enumerate(judge.labels)},
+        nodes={label: int((verdict == code).sum()) for code, label in enumerate(judge.labels)},
         volume=volume,
         connected=float(connected.sum() / inside.sum()) if connected.any() else None,
         extents=_extents(question, inside),
-        demands=demands(machine, _poses(question, np.flatnonzero(inside)[:: 1 + int(inside.sum()) // MOST_DEMANDS])),
+        demands=demands(machine, _poses_of_nodes(question, demanding_nodes)),
         conditions=judge.conditions,
         singularities_divide=judge.aspect != 0.0,
         limits=tuple(judge.limits),
@@ -233,7 +232,7 @@ def workspace(
     )
 
 
-def _nodes(question: GridQuestion, progress: Progress) -> xr.Dataset:
+def _quantities_at_nodes(question: GridQuestion, progress: Progress) -> xr.Dataset:
     """The quantities that judge the nodes, with `SHOWN`: these are NaN at a node that is not inside.
 
     Where nodes are judged at rest, `SHOWN` is asked for apart: a machine may rest where K is singular.
@@ -244,9 +243,9 @@ def _nodes(question: GridQuestion, progress: Progress) -> xr.Dataset:
     return nodes.assign({name: shown[name].where(nodes["status"] == Status.OK) for name in SHOWN})
 
 
-def _check(question: GridQuestion) -> None:
-    """Only coordinates of the pose, evenly spaced, and few enough nodes."""
-    poses = [path for path in values(question.machine) if path.startswith("pose.")]
+def _check_axes(question: GridQuestion) -> None:
+    """Refuse axes that are not coordinates of the pose, evenly spaced and upwards, and too many nodes."""
+    poses = [path for path in values(question.machine) if path.startswith(POSE)]
     for dim, field in zip(question.dims, question.fields, strict=True):
         if field not in poses:
             raise InputError(
@@ -267,7 +266,7 @@ def _check(question: GridQuestion) -> None:
         )
 
 
-def _poses(question: GridQuestion, numbers: Integers) -> Poses:
+def _poses_of_nodes(question: GridQuestion, numbers: Integers) -> Poses:
     """Coordinates of some nodes by their number."""
     places = np.unravel_index(numbers, question.grid.shape)
     return {
@@ -276,6 +275,7 @@ def _poses(question: GridQuestion, numbers: Integers) -> Poses:
 
 
 def _volume(judge: Judge, question: GridQuestion, seed: int, progress: Progress) -> Volume:
+    """The volume of the inside, from random points in the cells of the grid."""
     axes = question.grid.axes
     evaluation = evaluate(judge.machine, Cells(axes, seed), judge.quantities, progress)
     sizes = [float(axis.values[-1] - axis.values[0]) for axis in axes]
@@ -284,15 +284,15 @@ def _volume(judge: Judge, question: GridQuestion, seed: int, progress: Progress)
     return estimate_volume(judge.inside(evaluation.status, evaluation.values), unknown, sizes, units)
 
 
-def _nearest(question: GridQuestion) -> list[int]:
+def _nearest_node(question: GridQuestion) -> list[int]:
     """The node nearest to the file's pose, however far that is."""
     pose_of_file = values(question.machine)
     return [int(np.abs(axis.values - float(pose_of_file[axis.paths[0]])).argmin()) for axis in question.grid.axes]
 
 
-def _home(question: GridQuestion) -> tuple[int, ...] | None:
+def _home_node(question: GridQuestion) -> tuple[int, ...] | None:
     """The node nearest to the file's pose; None where that is off the grid by more than half a step."""
-    pose_of_file, node = values(question.machine), _nearest(question)
+    pose_of_file, node = values(question.machine), _nearest_node(question)
     for axis, place in zip(question.grid.axes, node, strict=True):
         distance = abs(axis.values[place] - float(pose_of_file[axis.paths[0]]))
         if distance > HALF_STEP * float(axis.values[1] - axis.values[0]):
@@ -314,9 +314,10 @@ def connected_to(region: Mask, seed: tuple[int, ...]) -> Mask:
 
 
 def _extents(question: GridQuestion, inside: Mask) -> dict[str, tuple[float, float]]:
+    """Least and greatest value of each coordinate over the inside nodes, SI."""
     extents = {}
-    for number, (field, axis) in enumerate(zip(question.fields, question.grid.axes, strict=True)):
-        others = tuple(i for i in range(inside.ndim) if i != number)
+    for k, (field, axis) in enumerate(zip(question.fields, question.grid.axes, strict=True)):
+        others = tuple(other for other in range(inside.ndim) if other != k)
         reached = axis.values[inside.any(axis=others)]
         if reached.size:
             extents[field] = float(reached[0]), float(reached[-1])
@@ -324,28 +325,28 @@ def _extents(question: GridQuestion, inside: Mask) -> dict[str, tuple[float, flo
 
 
 def _dataset(
-    nodes: xr.Dataset, verdict: Codes, connected: Mask, judge: Judge, volume: Volume, edges: Sequence[Float32s]
+    nodes: xr.Dataset, verdict: Codes, connected: Mask, judge: Judge, volume: Volume, border_shares: Sequence[Float32s]
 ) -> xr.Dataset:
     """The dataset of the nodes with verdicts, borders and volume."""
     dims = nodes["status"].dims
     words = " ".join("_".join(label.split()) for label in judge.labels)
-    about = {"flag_values": list(range(len(judge.labels))), "flag_meanings": words}
+    about_verdict = {"flag_values": list(range(len(judge.labels))), "flag_meanings": words}
     about_connected = {
         "long_name": "inside and joined to the file's pose",
         "flag_values": [0, 1],
         "flag_meanings": "no yes",
     }
-    figures = {
+    about_volume = {
         "volume": volume.value,
         "volume_standard_error": volume.standard_error,
         "volume_unknown": volume.unknown,
         "volume_units": volume.unit,
     }
     dataset = nodes.drop_vars("aspect").assign(
-        verdict=(dims, verdict, about), connected=(dims, connected.astype(np.int8), about_connected)
+        verdict=(dims, verdict, about_verdict), connected=(dims, connected.astype(np.int8), about_connected)
     )
-    for dim, edge in zip(dims, edges, strict=False):
-        dataset[f"{BORDER_VARIABLES}{dim}"] = (dims, edge, {"long_name": f"{BORDER_MEANING} {dim}", "units": "1"})
-    pose = {path: float(value) for path, value in values(judge.machine).items() if path.startswith("pose.")}
+    for dim, shares in zip(dims, border_shares, strict=False):  # borders are located along the first three axes
+        dataset[f"{BORDER_VARIABLES}{dim}"] = (dims, shares, {"long_name": f"{BORDER_MEANING} {dim}", "units": "1"})
+    pose = {path: float(value) for path, value in values(judge.machine).items() if path.startswith(POSE)}
     mode = {} if judge.machine.family.chains is None else {"assembly_mode": HOME_MODE}
-    return dataset.assign_attrs({**figures, "volume_method": METHOD, **mode, **pose})
+    return dataset.assign_attrs({**about_volume, "volume_method": VOLUME_METHOD, **mode, **pose})

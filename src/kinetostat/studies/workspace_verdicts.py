@@ -43,6 +43,15 @@ STATUS_VERDICTS = {
 """Verdicts of statuses; for a limit that is passed, the verdict names the limit."""
 LIMIT_VERDICT, CONDITION_VERDICT = "limits.", "fails "
 """The words with which verdicts of limits and of conditions begin."""
+HALVINGS = 7
+"""Number of halvings of a step: seven give the border to a 128th of it, finer than a printed line."""
+DRAWN_COORDINATES = 3
+"""Number of coordinates over which a workspace is drawn; the others keep the values of the pose in the file."""
+LEAST_DEPTH = 1e-3
+"""Least distance of a node from a border, in steps: at a distance of 0 it would lie neither inside nor outside, and a
+thousandth of a step is not seen in a picture."""
+DEPTH_UNSEARCHED = 0.5
+"""Distance of a node from a border that was not searched, in steps: it is taken to lie half-way."""
 
 
 def phrase(label: str) -> str:
@@ -80,7 +89,7 @@ class Judge:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """All verdicts; the place of one is its code."""
+        """All verdicts; the place of a verdict is its code."""
         return (
             *STATUS_VERDICTS.values(),
             BEYOND,
@@ -91,15 +100,15 @@ class Judge:
     @property
     def quantities(self) -> list[str]:
         """Quantities that decide beside the status of a pose, which is that under load if one is about the load."""
-        rest = ["load_factor"] if self.machine.loaded else []
-        return list(dict.fromkeys(["aspect", *rest, *(condition.quantity for condition in self.conditions)]))
+        of_load = ["load_factor"] if self.machine.loaded else []  # asked only for the status, which is then at rest
+        return list(dict.fromkeys(["aspect", *of_load, *(condition.quantity for condition in self.conditions)]))
 
     def inside(self, status: Codes, values: Mapping[str, Any]) -> Mask:
         """Tell which poses are inside, from their status and quantities."""
-        good = np.asarray(status == Status.OK) & ~self._beyond(values)
+        inside = np.asarray(status == Status.OK) & ~self._beyond_singularity(values)
         for condition in self.conditions:
-            good &= condition.holds(np.asarray(values[condition.quantity]))
-        return good
+            inside &= condition.holds(np.asarray(values[condition.quantity]))
+        return inside
 
     def verdicts(self, status: Codes, values: Mapping[str, Any], poses: Callable[[Integers], Poses]) -> Codes:
         """Judge poses; a verdict is a place in `labels`.
@@ -112,7 +121,7 @@ class Judge:
         codes = np.full(status.shape, labels.index(INSIDE), dtype=np.int8)
         for code, verdict in STATUS_VERDICTS.items():
             codes[status == code] = labels.index(verdict)
-        codes[(status == Status.OK) & self._beyond(values)] = labels.index(BEYOND)
+        codes[(status == Status.OK) & self._beyond_singularity(values)] = labels.index(BEYOND)
         limited = np.flatnonzero(status == Status.JOINT_LIMIT)
         if limited.size:
             limit_codes = np.array([labels.index(f"{LIMIT_VERDICT}{name}") for name in self.limits])
@@ -124,7 +133,8 @@ class Judge:
             codes[(codes == labels.index(INSIDE)) & fails] = labels.index(f"{CONDITION_VERDICT}{condition.text}")
         return codes
 
-    def _beyond(self, values: Mapping[str, Any]) -> Mask:
+    def _beyond_singularity(self, values: Mapping[str, Any]) -> Mask:
+        """Which poses are of the other aspect than the file's pose; none where that has no aspect."""
         return np.asarray((np.asarray(values["aspect"]) * self.aspect) < 0.0)
 
 
@@ -163,19 +173,9 @@ def demands(machine: Machine, poses: Mapping[str, Array]) -> tuple[Demand, ...]:
 
 
 def _demand(limit: Limit, ends: tuple[float, float]) -> Demand:
+    """The range of what a limit is about, from its ends in SI, as people read it."""
     (least, unit), (greatest, _) = (as_read(number, limit.unit) for number in sorted(map(limit.shown, ends)))
     return Demand(name=limit.name, title=limit.title, least=least, greatest=greatest, unit=unit)
-
-
-HALVINGS = 7
-"""Number of halvings of a step: seven give the border to a 128th of it, finer than a printed line."""
-DRAWN_COORDINATES = 3
-"""Number of coordinates over which a workspace is drawn; the others keep the values of the pose in the file."""
-LEAST_DEPTH = 1e-3
-"""Least distance of a node from a border, in steps: at a distance of 0 it would lie neither inside nor outside, and a
-thousandth of a step is not seen in a picture."""
-DEPTH_UNSEARCHED = 0.5
-"""Distance of a node from a border that was not searched, in steps: it is taken to lie half-way."""
 
 
 def borders(judge: Judge, question: GridQuestion, verdict: Codes, home: Sequence[int]) -> list[Float32s]:
@@ -192,7 +192,7 @@ def borders(judge: Judge, question: GridQuestion, verdict: Codes, home: Sequence
         An array over the nodes for each of the first three axes. Where the next node along the axis has another
         verdict, the entry is the share of the step to it at which the verdict changes; elsewhere it is NaN.
     """
-    axes, nodes_by_axis = question.grid.axes, []
+    axes, nodes_by_axis = question.grid.axes, []  # for each drawn axis, nodes whose next neighbour differs
     drawn = tuple(slice(None) if k < DRAWN_COORDINATES else slice(home[k], home[k] + 1) for k in range(verdict.ndim))
     for k in range(min(DRAWN_COORDINATES, verdict.ndim)):
         changes = np.zeros(verdict.shape, dtype=bool)
@@ -202,24 +202,34 @@ def borders(judge: Judge, question: GridQuestion, verdict: Codes, home: Sequence
         searched[drawn] = True
         nodes_by_axis.append(np.argwhere(changes & searched))
     nodes = np.concatenate(nodes_by_axis)
-    axis = np.repeat(np.arange(len(nodes_by_axis)), [len(places) for places in nodes_by_axis])
-    shares = _border_shares(judge, axes, nodes, axis, verdict) if len(nodes) else np.zeros(0)
-    results = []
+    axis_of_node = np.repeat(np.arange(len(nodes_by_axis)), [len(places) for places in nodes_by_axis])
+    shares = _border_shares(judge, axes, nodes, axis_of_node, verdict) if len(nodes) else np.zeros(0)
+    shares_by_axis = []
     for k, places in enumerate(nodes_by_axis):
-        result = np.full(verdict.shape, np.nan, dtype=np.float32)
-        result[tuple(places.T)] = shares[axis == k]
-        results.append(result)
-    return results
+        over_nodes = np.full(verdict.shape, np.nan, dtype=np.float32)
+        over_nodes[tuple(places.T)] = shares[axis_of_node == k]
+        shares_by_axis.append(over_nodes)
+    return shares_by_axis
 
 
-def _border_shares(judge: Judge, axes: Sequence[Axis], nodes: Integers, axis: Integers, verdict: Codes) -> Array:
-    """Halve the step from each node along its axis, and return the share of the step at which the verdict changes."""
-    start = {path: a.values[nodes[:, k]] for k, a in enumerate(axes) for path in a.paths}
-    step = {
-        path: np.where(axis == k, a.values[np.minimum(nodes[:, k] + 1, len(a.values) - 1)] - a.values[nodes[:, k]], 0.0)
-        for k, a in enumerate(axes)
-        for path in a.paths
-    }
+def _border_shares(
+    judge: Judge, axes: Sequence[Axis], nodes: Integers, axis_of_node: Integers, verdict: Codes
+) -> Array:
+    """Halve the step from each node along its axis, and return the share of the step at which the verdict changes.
+
+    Args:
+        judge: gives the verdict on a pose.
+        axes: axes of the grid.
+        nodes: indices of the nodes [n x axes].
+        axis_of_node: number of the axis along which each of them has a neighbour with another verdict [n].
+        verdict: the verdict on each node of the grid.
+    """
+    start, step = Poses(), Poses()
+    for k, axis in enumerate(axes):
+        values = axis.values[nodes[:, k]]
+        following = axis.values[np.minimum(nodes[:, k] + 1, len(axis.values) - 1)]
+        start |= dict.fromkeys(axis.paths, values)
+        step |= dict.fromkeys(axis.paths, np.where(axis_of_node == k, following - values, 0.0))
     verdict_at_node = verdict[tuple(nodes.T)]
     low, high = np.zeros(len(nodes)), np.ones(len(nodes))
     for _ in range(HALVINGS):

@@ -27,7 +27,7 @@ from kinetostat.studies.workspace import (
     BORDER_VARIABLES,
     COLOURING_QUANTITY,
     FEWEST_CELLS,
-    METHOD,
+    VOLUME_METHOD,
     Workspace,
     workspace,
 )
@@ -400,7 +400,7 @@ def _volume(answer: Workspace) -> dict[str, Any]:
         "units": volume.unit,
         "share_of_box": volume.share,
         "cells": volume.cells,
-        "method": METHOD,
+        "method": VOLUME_METHOD,
     }
 
 
