@@ -4,18 +4,18 @@ Where the platform alone is massive, the compliance at the tool is all that is n
 links or rotors are massive too, the loops of the machine are cut at its rods, as `equilibrium.reduced` does. In both
 cases the eigenvalues are found by sums and Jacobi's rotations, without branches.
 
-Machines that allow neither are solved by `modes`, and modes that it has found are given back to the formulas as columns
-of numbers. A mode is a stationary point of its mu = 1 / omega² over all motions that obey the closing of the legs. So a
-change of the machine changes mu as if the mode and the forces that close the legs stayed as they are: no eigenvalue
-problem is differentiated, and any machine will do.
+Machines that allow neither are solved by `modes`. The modes that it finds are given back to the formulas as columns of
+numbers. To first order, a change of the machine changes mu = 1 / omega² as if the mode, and the forces that close the
+legs, stayed as they are (Hellmann and Feynman). So no eigenvalue problem is differentiated, and any machine will do.
 
 Source: theory (58), with C where the platform alone is massive, (63) and what follows it. Units are those of
 `equilibrium.mechanism`.
 """
 
 import math
-import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from itertools import islice
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,16 +36,20 @@ from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.actuators import values_of_drives
 from kinetostat.machine.loads import PLATFORM, moving_masses
 from kinetostat.machine.machine import Configuration, Machine
+from kinetostat.machine.parameters import parameters
 from kinetostat.numerics.motions import of_scalars, still
 from kinetostat.tolerances import CLOSING_ROUND_OFF, UNRESISTED
 from kinetostat.vibration.inertia import energy_of, leg_rates, mass_matrices, platform_inertia, platform_rates
 from kinetostat.vibration.modes import frequencies, hertz, mass_matrix, motions_left_out, solved_modes, stiffness_matrix
 
-EQUAL_SQUARES = 1e-9
-"""Relative difference of 1 / omega² up to which two modes share one frequency: far above round-off, and far below what
-two parts that are meant to differ do."""
-PATHS_OF_LEG_MASSES = re.compile(r"linear_density\.|drives\.(.*\.)?rotor_inertia|legs\..*\.mass|sections\..*\.density")
-"""Leaf paths of parameters that may give links or rotors a mass."""
+EQUAL_INVERSE_SQUARES = 1e-9
+"""Relative difference of 1 / omega² up to which two modes share one frequency: far above round-off, and far below the
+difference of two parts that are meant to differ."""
+KINDS_OF_MASS = ("mass", "inertia", "moment of inertia", "density", "linear density")
+"""Kinds of quantities that give a part a mass."""
+MASSES_BESIDE_LEGS = ("tool", "cables")
+"""Tables whose masses are not those of links and rotors: of the platform with its payload, and of cables, which are
+weightless here."""
 SPARE_MODES = 5
 """Modes beyond the last one that is wanted: equal frequencies share their mean, so that equal ones must be known."""
 
@@ -68,9 +72,15 @@ def leaves_plane(machine: Machine, machine_cut: Cut) -> bool:
 def platform_alone(machine: Machine | MachineState, varying: Collection[str] = ()) -> bool:
     """Whether no leg has a mass or a rotor at any value of the varying parameters (leaf paths)."""
     state = state_of(machine)
-    if any(PATHS_OF_LEG_MASSES.match(path) for path in varying):
+    if not _paths_of_leg_masses(state.machine).isdisjoint(varying):
         return False
     return legs_without_mass(state.machine, state.configuration)
+
+
+def _paths_of_leg_masses(machine: Machine) -> set[str]:
+    """Return the leaf paths of the parameters that may give links or rotors a mass."""
+    masses = (p for p in parameters(machine.family) if p.quantity.kind in KINDS_OF_MASS)
+    return {leaf for p in masses if p.path.partition(".")[0] not in MASSES_BESIDE_LEGS for leaf in p.leaves}
 
 
 def legs_without_mass(machine: Machine, configuration: Configuration) -> bool:
@@ -94,6 +104,7 @@ def frequencies_over_scalars(
     """
     if legs_without_mass(machine, response.configuration):
         return sorted_frequencies(eigenvalues(platform_matrix(machine, response), sloped))
+    # `reducible` says of which machines the loops are cut by rods alone.
     machine_cut = cut(with_share(mechanism_of(machine, response.configuration, joints, None), 0.0))
     if machine_cut is None or machine_cut.legs:
         raise ValueError("loops that rods do not cut have no frequencies over scalars")
@@ -127,7 +138,7 @@ def platform_matrix(machine: Machine, response: Response) -> list[Row]:
     inertia = _platform_inertia(machine, response)
     compliance = [[response.compliance.entry(i, j) * units[i] * units[j] for j in parts] for i in parts]
     mass = [[inertia[i][j] * (1.0 / (units[i] * units[j])) for j in parts] for i in parts]
-    factor = np.array(semidefinite_root(compliance), dtype=object)
+    factor = np.array(semidefinite_root(compliance), dtype=object)  # entries may be traced, and NumPy multiplies these
     return (factor.T @ np.array(mass, dtype=object) @ factor).tolist()
 
 
@@ -187,10 +198,9 @@ def _matrices_over_carrier(machine_cut: Cut, coordinates: Row) -> tuple[Array, A
 def _stretch_dyad(rod: ElasticRod, far: Array) -> Array:
     """Return the dyad of the unit line of a rod to the point `far`: the square of its rate by a twist [6 x 6]."""
     span = (far - rod.ends.near)[0]
-    size = sqrt(total([part * part for part in span]))
-    unit = np.array([part * (1.0 / size) for part in span], dtype=object)
-    moment = np.cross(far[0], unit)
-    line = np.concatenate([moment, unit])
+    length = sqrt(total([part * part for part in span]))
+    direction = np.array([part * (1.0 / length) for part in span], dtype=object)
+    line = np.concatenate([np.cross(far[0], direction), direction])
     return np.asarray(np.outer(line, line))
 
 
@@ -200,9 +210,9 @@ def sorted_frequencies(modes: Sequence[Scalar]) -> list[Scalar]:
     Args:
         modes: 1 / omega² of each mode, s², in any order.
     """
-    inverse_squares, size = [*modes], len(modes)
-    for first in range(size):  # odd-even sort without branches: exchange neighbours until the largest come first
-        for k in range(first % 2, size - 1, 2):
+    inverse_squares, count = [*modes], len(modes)
+    for turn in range(count):  # odd-even sort without branches: exchange neighbours until the largest come first
+        for k in range(turn % 2, count - 1, 2):
             left, right = inverse_squares[k], inverse_squares[k + 1]
             swap = left < right
             inverse_squares[k], inverse_squares[k + 1] = where(swap, right, left), where(swap, left, right)
@@ -212,7 +222,8 @@ def sorted_frequencies(modes: Sequence[Scalar]) -> list[Scalar]:
 
 
 def _mean_of_equals(inverse_squares: Sequence[Scalar], inverse_square: Scalar) -> Scalar:
-    equals = [abs(other - inverse_square) <= EQUAL_SQUARES * abs(inverse_square) for other in inverse_squares]
+    """Return the mean of all 1 / omega² that are equal to one of them, itself included."""
+    equals = [abs(other - inverse_square) <= EQUAL_INVERSE_SQUARES * abs(inverse_square) for other in inverse_squares]
     sums = total([where(equal, other, 0.0) for equal, other in zip(equals, inverse_squares, strict=True)])
     return sums / total([where(equal, 1.0, 0.0) for equal in equals])
 
@@ -221,6 +232,22 @@ def _frequency(inverse_square: Scalar, largest: Scalar) -> Scalar:
     """Return the frequency of a mode by its 1 / omega², s²; infinite where that is round-off beside the largest one."""
     finite = inverse_square > UNRESISTED * largest
     return where(finite, 0.5 / math.pi / sqrt(where(finite, inverse_square, 1.0)), math.inf)
+
+
+class KnownMode(NamedTuple):
+    """A mode that is known, in the order of its columns.
+
+    Attributes:
+        inverse_square: 1 / omega², s².
+        platform: rates of the platform along its ways.
+        legs: rates of the coordinates of each leg.
+        forces: forces that close each leg, along the ways.
+    """
+
+    inverse_square: Scalar
+    platform: Row
+    legs: list[Row]
+    forces: list[Row]
 
 
 def mode_columns(machine: Machine, count: int, most: int) -> list[Array]:
@@ -232,25 +259,23 @@ def mode_columns(machine: Machine, count: int, most: int) -> list[Array]:
         most: number of modes; those that a pose does not have are zero.
 
     Returns:
-        The unit of force, then for each mode its 1 / omega², its motion of all coordinates, and the forces that close
-        the legs. NaN where springs do not hold the machine.
+        The unit of force, then for each mode the numbers of a `KnownMode`. NaN where springs do not hold the machine.
     """
     equations = MachineState(machine, count).free_equations
-    mechanism = equations.mechanism
     stiff, conditions = stiffness_matrix(equations)
-    mass, closing = mass_matrix(equations), conditions.shape[1]
+    mass, closing_count = mass_matrix(equations), conditions.shape[1]
     constraints = np.concatenate([conditions, motions_left_out(equations, mass)], axis=1)
-    columns = np.full((count, most, 1 + stiff.shape[1] + closing), np.nan)
+    columns = np.full((count, most, 1 + stiff.shape[1] + closing_count), np.nan)
     for part in solved_modes(equations):
         known = min(most, part.inverse_squares.shape[1])
         inverse_squares, shapes = part.inverse_squares[:, :known], part.shapes[:, :, :known]
         # Along allowed motions mu K y = M y; across them, the forces of the constraints balance the difference.
         imbalance = stiff[part.rows] @ shapes * inverse_squares[:, None] - mass[part.rows] @ shapes
         forces = np.linalg.pinv(np.swapaxes(constraints[part.rows], 1, 2), rcond=CLOSING_ROUND_OFF) @ imbalance
-        rows = np.concatenate([inverse_squares[:, None], shapes, forces[:, :closing]], axis=1)
+        numbers = np.concatenate([inverse_squares[:, None], shapes, forces[:, :closing_count]], axis=1)
         columns[part.rows] = 0.0
-        columns[part.rows, :known] = np.swapaxes(rows, 1, 2)
-    return [mechanism.force, *np.ascontiguousarray(columns.reshape(count, -1).T)]
+        columns[part.rows, :known] = np.swapaxes(numbers, 1, 2)
+    return [equations.mechanism.force, *np.ascontiguousarray(columns.reshape(count, -1).T)]
 
 
 @dataclass(frozen=True)
@@ -266,14 +291,10 @@ class MachineOfKnownModes:
     most: int
 
     @property
-    def sizes(self) -> list[int]:
-        """Number of coordinates of the platform, and of each leg."""
-        return [self.mechanism.ways.shape[1], *(leg.size for leg in self.mechanism.legs)]
-
-    @property
     def columns(self) -> int:
         """Number of columns that `mode_columns` makes of it."""
-        return 1 + self.most * (1 + sum(self.sizes) + self.sizes[0] * len(self.mechanism.legs))
+        closing_count = self.mechanism.ways.shape[1] * len(self.mechanism.legs)
+        return 1 + self.most * (1 + self.mechanism.motion_places.count + closing_count)
 
     def inverse_squares(self, columns: Sequence[Scalar]) -> list[Scalar]:
         """1 / omega² of each mode, s² [most]: exact, as their derivatives by the machine's parameters are.
@@ -281,33 +302,40 @@ class MachineOfKnownModes:
         Args:
             columns: the columns that `mode_columns` makes.
         """
-        force_unit, *of_modes = columns
-        size = len(of_modes) // self.most
-        ratio = self.mechanism.force[0] / force_unit
-        return [self._inverse_square(of_modes[k * size : (k + 1) * size], ratio) for k in range(self.most)]
+        force_unit, *numbers = columns
+        force_ratio, remaining = self.mechanism.force[0] / force_unit, iter(numbers)
+        return [self._inverse_square(self._next_mode(remaining), force_ratio) for _ in range(self.most)]
 
-    def _inverse_square(self, columns: Sequence[Scalar], ratio: Scalar) -> Scalar:
+    def _next_mode(self, numbers: Iterator[Scalar]) -> KnownMode:
+        """Take a mode off the numbers of several."""
+        ways, legs = self.mechanism.ways.shape[1], self.mechanism.legs
+        return KnownMode(
+            inverse_square=next(numbers),
+            platform=[*islice(numbers, ways)],
+            legs=[[*islice(numbers, leg.size)] for leg in legs],
+            forces=[[*islice(numbers, ways)] for _ in legs],
+        )
+
+    def _inverse_square(self, mode: KnownMode, force_ratio: Scalar) -> Scalar:
         """Return mu + r (y^T M y - mu y^T K y) + 2 f . g for one mode y, with mu = 1 / omega².
 
         f are the forces that close the legs, g the gaps that y opens, and r is the ratio of the units of force of this
         machine and of the one whose mode it is. At the known mode all but mu vanishes; its derivatives do not.
         """
-        mechanism, remaining = self.mechanism, iter(columns)
-        inverse_square = next(remaining)
-        rates, *leg_motions = [of_scalars([next(remaining) for _ in range(size)])[0] for size in self.sizes]
-        forces = [mechanism.ways @ [next(remaining) for _ in range(self.sizes[0])] for _ in mechanism.legs]
-        twist = mechanism.ways @ rates
+        mechanism = self.mechanism
+        twist = mechanism.ways @ of_scalars(mode.platform)[0]
         kinetic = energy_of(mechanism.platform, platform_rates(mechanism.platform, still(1)), twist, mechanism.length)
         strain, opening_work = 0.0, 0.0
-        amounts = np.zeros((1, len(mechanism.actuators) + mechanism.growth.shape[1]))
-        for leg, motion, force in zip(mechanism.legs, leg_motions, forces, strict=True):
+        amounts = np.zeros((1, len(mechanism.actuators) + mechanism.growth.shape[1]))  # relaxed links have not grown
+        for leg, rates, force in zip(mechanism.legs, mode.legs, mode.forces, strict=True):
+            motion = of_scalars(rates)[0]
             placed = leg.chain.place(np.zeros((1, leg.size)).astype(object), amounts.astype(object))
             kinetic = kinetic + energy_of(leg.masses, leg_rates(leg, placed), motion, mechanism.length)
             kinetic = kinetic + mechanism.length[0] * total(list(leg.rotors[0] * motion * motion))
             strain = strain + total(list(leg.stiffness[0] * motion * motion))
             end_twist = placed.screws[0].T @ (leg.chain.follows @ motion)
-            opening_work = opening_work + total(list(force * (end_twist - twist)))
-        return inverse_square + ratio * (kinetic - inverse_square * strain) + 2.0 * opening_work
+            opening_work = opening_work + total(list(mechanism.ways @ force * (end_twist - twist)))
+        return mode.inverse_square + force_ratio * (kinetic - mode.inverse_square * strain) + 2.0 * opening_work
 
 
 def machine_of_known_modes(
