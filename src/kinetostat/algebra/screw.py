@@ -6,6 +6,7 @@ Source: theory (28); Murray, Li and Sastry, A Mathematical Introduction to Robot
 and 2.5. Axes are whatever the caller's are; every function names the point at which its screw is.
 """
 
+from collections.abc import Sequence
 from typing import Self
 
 from kinetostat.algebra.scalar import Scalar, is_zero
@@ -22,6 +23,11 @@ class Screw:
 
     rotational: Vector
     translational: Vector
+
+    @classmethod
+    def of(cls, components: Sequence[Scalar]) -> Self:
+        """Return the screw of six components, in the order of `components`."""
+        return cls(Vector(*components[:3]), Vector(*components[3:]))
 
     def components(self) -> tuple[Scalar, ...]:
         """The six scalars in the order rx ry rz x y z."""

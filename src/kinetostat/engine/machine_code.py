@@ -18,7 +18,7 @@ import struct
 import sys
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -39,7 +39,7 @@ SELF_LINKED = sys.platform == "linux" and platform.machine() == "x86_64"
 
 
 HEAD = struct.Struct("<qqq")
-"""The numbers of a packed `MachineCode`, which stand before its bytes."""
+"""The numbers `entry`, `lanes` and `rows` of a packed `MachineCode`, which stand before its bytes."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,8 @@ class MachineCode:
 
 def unpack(data: bytes) -> MachineCode:
     """Take apart what `MachineCode.pack` put in a row."""
-    return MachineCode(data[HEAD.size :], *HEAD.unpack_from(data))
+    entry, lanes, rows = HEAD.unpack_from(data)
+    return MachineCode(data[HEAD.size :], entry, lanes, rows)
 
 
 def machine_code_of(body: Body) -> MachineCode:
@@ -81,7 +82,7 @@ def compile_source(assembly: str, rows: int) -> MachineCode:
         rows: number of its results.
     """
     file = object_file_of(assembly)
-    image, entry = _image(file) if SELF_LINKED else (file, -1)
+    image, entry = _linked_image(file) if SELF_LINKED else (file, -1)
     return MachineCode(image, entry, host_lanes(), rows)
 
 
@@ -93,7 +94,7 @@ def object_file_of(assembly: str) -> bytes:
 
 
 def _load_object(object_file: bytes) -> tuple[int, Any]:
-    """Let LLVM load an object file; gives the address of its function, and what keeps it in memory."""
+    """Let LLVM load an object file; return the address of its function, and what keeps it in memory."""
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_maker()())
     engine.add_object_file(llvm.ObjectFileRef.from_data(object_file))
     engine.finalize_object()
@@ -134,38 +135,94 @@ def host_features() -> tuple[str, ...]:
     return tuple(name for name in VECTOR_SETS if features.get(name))
 
 
+SECTION_TABLE, SECTION_SIZE_AND_COUNT = 40, 58
+"""Places in the header of an object file: where its table of sections begins, and how many there are of which size."""
 SECTION, SYMBOL, RELOCATION = struct.Struct("<IIQQQQIIQQ"), struct.Struct("<IBBHQQ"), struct.Struct("<QQq")
 PROGBITS, SYMBOL_TABLE, RELOCATIONS = 1, 2, 4
-"""Types of sections: contents, symbols, and places to be filled in with what has to be added."""
+"""Kinds of sections: contents, symbols, and places to be filled in with what has to be added."""
 ALLOCATED = 2
 """Flag of sections that lie in memory when the program runs."""
 RELATIVE = (2, 4)
-"""Types of relocations that say how far away something is, in 32 bits: R_X86_64_PC32 and R_X86_64_PLT32."""
+"""Kinds of relocations that say how far away something is, in 32 bits: R_X86_64_PC32 and R_X86_64_PLT32."""
 GLOBAL_FUNCTION = 0x12
-"""Binding and type of a symbol that is a function seen from outside, in one byte (ELF: STB_GLOBAL and STT_FUNC)."""
+"""Binding and kind of a symbol that is a function seen from outside, in one byte (ELF: STB_GLOBAL and STT_FUNC)."""
 
 
-def _image(file: bytes) -> tuple[bytes, int]:
+class ObjectSection(NamedTuple):
+    """A section of an object file, by the fields of `SECTION`; of relocations, `target` is what they fill in."""
+
+    name: int
+    kind: int
+    flags: int
+    address: int
+    offset: int
+    size: int
+    link: int
+    target: int
+    alignment: int
+    entry_size: int
+
+    def content(self, file: bytes) -> bytes:
+        """Its bytes."""
+        return file[self.offset : self.offset + self.size]
+
+
+class ObjectSymbol(NamedTuple):
+    """A symbol, by the fields of `SYMBOL`: its value is its place in a section, given by number."""
+
+    name: int
+    binding_and_kind: int
+    visibility: int
+    section: int
+    value: int
+    size: int
+
+
+class ObjectRelocation(NamedTuple):
+    """A place to be filled in with the distance to a symbol, by the fields of `RELOCATION`."""
+
+    place: int
+    symbol_and_kind: int
+    added: int
+
+    @property
+    def symbol(self) -> int:
+        """Number of the symbol."""
+        return self.symbol_and_kind >> 32
+
+    @property
+    def kind(self) -> int:
+        """How the distance is written."""
+        return self.symbol_and_kind & 0xFFFFFFFF
+
+
+def _linked_image(file: bytes) -> tuple[bytes, int]:
     """Put the sections of an object file that are needed at run time behind one another, and find the function."""
-    (first,), (size, count) = struct.unpack_from("<Q", file, 40), struct.unpack_from("<HH", file, 58)
-    sections = [SECTION.unpack_from(file, first + size * k) for k in range(count)]
+    (first,), (size, count) = (
+        struct.unpack_from(form, file, place)
+        for form, place in (("<Q", SECTION_TABLE), ("<HH", SECTION_SIZE_AND_COUNT))
+    )
+    sections = [ObjectSection(*SECTION.unpack_from(file, first + size * number)) for number in range(count)]
     image, places = bytearray(), dict[int, int]()
-    for k, (_, kind, flags, _, offset, length, _, _, align, _) in enumerate(sections):
-        if kind == PROGBITS and flags & ALLOCATED:
-            image += bytes(-len(image) % align)
-            places[k] = len(image)
-            image += file[offset : offset + length]
-    (_, _, _, _, offset, length, *_), *_ = (section for section in sections if section[1] == SYMBOL_TABLE)
-    symbols = list(SYMBOL.iter_unpack(file[offset : offset + length]))
-    for _, kind, _, _, offset, length, _, target, _, _ in sections:
-        if kind == RELOCATIONS and target in places:
-            for at, what, added in RELOCATION.iter_unpack(file[offset : offset + length]):
-                _, _, _, home, value, _ = symbols[what >> 32]
-                if what & 0xFFFFFFFF not in RELATIVE or home not in places:
+    for number, section in enumerate(sections):
+        if section.kind == PROGBITS and section.flags & ALLOCATED:
+            image += bytes(-len(image) % section.alignment)
+            places[number] = len(image)
+            image += section.content(file)
+    table = next(section for section in sections if section.kind == SYMBOL_TABLE)
+    symbols = [ObjectSymbol(*fields) for fields in SYMBOL.iter_unpack(table.content(file))]
+    for section in sections:
+        if section.kind == RELOCATIONS and section.target in places:
+            for relocation in (ObjectRelocation(*fields) for fields in RELOCATION.iter_unpack(section.content(file))):
+                symbol = symbols[relocation.symbol]
+                if relocation.kind not in RELATIVE or symbol.section not in places:
                     raise ValueError("an object file refers to something that is not in it")
-                address = places[target] + at
-                struct.pack_into("<i", image, address, places[home] + value + added - address)
-    (entry,) = (places[home] + value for _, info, _, home, value, _ in symbols if info == GLOBAL_FUNCTION)
+                address = places[section.target] + relocation.place
+                distance = places[symbol.section] + symbol.value + relocation.added - address
+                struct.pack_into("<i", image, address, distance)
+    (entry,) = (
+        places[symbol.section] + symbol.value for symbol in symbols if symbol.binding_and_kind == GLOBAL_FUNCTION
+    )
     return bytes(image), entry
 
 
@@ -202,6 +259,7 @@ class Program:
         addresses = [ctypes.c_void_p(_address(array)) for array in (fixed, starts, rows, codes)]
         call, arguments = self._call, (*addresses, ctypes.c_int64(count))
 
+        # The default argument keeps alive what lies at the addresses.
         def evaluate(_kept: Any = (self, fixed, arrays, starts, rows)) -> None:
             call(*arguments)
 
@@ -231,7 +289,7 @@ def _addresses(rows: Array) -> Sequence[int]:
 
 
 def _map(code: MachineCode) -> tuple[int, Any]:
-    """Copy linked code into memory that is executable then; gives the address of the function, and the memory."""
+    """Copy linked code into memory, make it executable, and return the address of the function and the memory."""
     memory = mmap.mmap(-1, len(code.image), prot=mmap.PROT_READ | mmap.PROT_WRITE)
     memory[: len(code.image)] = code.image
     start = ctypes.addressof(ctypes.c_char.from_buffer(memory))
@@ -242,6 +300,7 @@ def _map(code: MachineCode) -> tuple[int, Any]:
 
 @cache
 def _protect() -> Any:
+    """Return the function of the system that changes what memory may be used for."""
     protect = ctypes.CDLL(None, use_errno=True).mprotect
     protect.argtypes = (ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int)
     return protect

@@ -56,7 +56,7 @@ def commanded_state(mechanism: Mechanism) -> CommandedState:
         state, settled[rows] = state.with_part(rows, rest.state), rest.settled
         error = logarithm(rest.state.platform)
         first_error[rows] = np.where(np.isnan(first_error[rows]), error, first_error[rows])
-        rates[rows] = solve_at_rest(rest.balance, -rest.balance.by_actuators())[:, mechanism.unknown_places.twist]
+        rates[rows] = solve_at_rest(rest.balance, -rest.balance.by_actuators())[:, mechanism.unknown_places.platform]
         change = -np.einsum("nac,nc->na", np.linalg.pinv(rates[rows], rcond=UNRESISTED), error @ ways)
         return np.where(rest.settled, largest(error), np.nan), lambda unsolved: change[unsolved]
 

@@ -315,7 +315,7 @@ def state_after(mechanism: Mechanism, state: State, step: Array) -> State:
     """Return the state after a step of the unknowns [n x unknowns]."""
     ways, places = mechanism.ways, mechanism.unknown_places
     return State(
-        platform=exponential(step[:, places.twist] @ ways.T) @ state.platform,
+        platform=exponential(step[:, places.platform] @ ways.T) @ state.platform,
         coordinates=tuple(
             before + step[:, part] for before, part in zip(state.coordinates, places.coordinates, strict=True)
         ),

@@ -20,7 +20,7 @@ from kinetostat.algebra.symmetric import POSITIONS
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.elastic_legs import NO_MASSES, ElasticLeg, RodEnds, masses_of_one_body
-from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
+from kinetostat.equilibrium.mechanism import LegwisePlaces, Mechanism, legwise_places, mechanism_of
 from kinetostat.equilibrium.state import state_of
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.chain import Chain
@@ -71,6 +71,11 @@ class Cut:
     carrier: ElasticLeg
     rods: tuple[ElasticRod, ...]
     legs: tuple[ElasticLeg, ...] = ()
+
+    @property
+    def unknown_places(self) -> LegwisePlaces:
+        """Places among the unknowns: of the coordinates of the carrier, then of each leg, followed by its wrench."""
+        return legwise_places(self.carrier.size, self.legs, wrench_size=self.mechanism.ways.shape[1])
 
 
 def cut(mechanism: Mechanism) -> Cut | None:

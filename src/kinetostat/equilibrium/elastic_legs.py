@@ -7,7 +7,7 @@ Source: theory (35).
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -53,7 +53,7 @@ class Masses:
         return replace(self, **{name: getattr(self, name)[rows] for name in _ARRAYS_OF_MASSES})
 
     def of(self, numbers: Sequence[int]) -> "Masses":
-        """Some of the masses, of bars whose other halves are at rest."""
+        """Some of the masses, by their numbers; halves of bars become masses by themselves."""
         return Masses(
             names=tuple(self.names[n] for n in numbers),
             carried=tuple(self.carried[n] for n in numbers),
@@ -63,6 +63,7 @@ class Masses:
 
 
 _ARRAYS_OF_MASSES = ("point", "mass", "uncoupled", "inertia")
+"""All fields of `Masses` that have the poses first, and the masses next: they are cut and joined together."""
 NO_MASSES = Masses(
     names=(),
     carried=(),
@@ -177,6 +178,7 @@ class ElasticLeg:
 
 
 _ARRAYS_OF_LEG = ("stiffness", "preload", "idle", "rotors", "dampers")
+"""All fields of `ElasticLeg` that are arrays with the poses first: they are cut and joined together."""
 
 
 @dataclass(frozen=True)
@@ -201,21 +203,45 @@ def like_legs(legs: Sequence[ElasticLeg]) -> list[LikeLegs]:
 
     At many poses each leg is left by itself.
     """
-    groups: dict[Any, list[int]] = {}
+    groups: dict[_LegForm, list[int]] = {}
     amounts = [tuple(dict.fromkeys(number for number in leg.chain.given if number >= 0)) for leg in legs]
     for number, (leg, own_amounts) in enumerate(zip(legs, amounts, strict=True)):
-        given = tuple(own_amounts.index(amount) if amount >= 0 else amount for amount in leg.chain.given)
-        alone = number if len(leg.stiffness) > FEW_POSES else None
-        form = (given, alone, leg.chain.coordinate, leg.chain.twists.shape, leg.sign.tobytes(), leg.masses.carried)
+        form = _LegForm(
+            given=tuple(own_amounts.index(amount) if amount >= 0 else amount for amount in leg.chain.given),
+            alone=number if len(leg.stiffness) > FEW_POSES else None,
+            coordinate=leg.chain.coordinate,
+            shape=leg.chain.twists.shape,
+            signs=leg.sign.tobytes(),
+            carried=leg.masses.carried,
+        )
         groups.setdefault(form, []).append(number)
     return [
         LikeLegs(
             numbers=tuple(numbers),
-            leg=_side_by_side([legs[k] for k in numbers], given),
-            given=np.array([amounts[k] for k in numbers], dtype=np.int64),
+            leg=_side_by_side([legs[number] for number in numbers], form.given),
+            given=np.array([amounts[number] for number in numbers], dtype=np.int64),
         )
-        for (given, *_), numbers in groups.items()
+        for form, numbers in groups.items()
     ]
+
+
+class _LegForm(NamedTuple):
+    """All that legs have in common which are evaluated together.
+
+    Attributes:
+        given: for each motion, the number among the leg's own amounts of that which drives it; -1 for none.
+        alone: number of a leg that is left by itself, else None.
+        coordinate, shape: as in `Chain`, and the shape of its twists.
+        signs: bytes of the signs of its springs.
+        carried: as in `Masses`.
+    """
+
+    given: tuple[int, ...]
+    alone: int | None
+    coordinate: tuple[int, ...]
+    shape: tuple[int, ...]
+    signs: bytes
+    carried: tuple[int, ...]
 
 
 def _side_by_side(legs: Sequence[ElasticLeg], given: tuple[int, ...]) -> ElasticLeg:

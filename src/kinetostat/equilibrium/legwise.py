@@ -323,16 +323,16 @@ class LegwiseTangent:
 
         Args:
             machine: the machine.
-            coordinates: those of the carrier, then those of each leg with its wrench.
+            coordinates: its unknowns, in the order of `Cut.unknown_places`.
             chord: whether to take the rates of springs alone in the free state. The step then is one of the chord
                 method (the simplified Newton method): it takes a quarter of the operations and leaves a share of what
                 is missing that is as small as the loads turn the legs.
         """
         self.mechanism, self._rods = machine.mechanism, machine.rods
-        mechanism, carrier = machine.mechanism, machine.carrier
+        mechanism, places = machine.mechanism, machine.unknown_places
         self._ways = ways = mechanism.ways.astype(object)
-        size, start = ways.shape[1], carrier.size
-        placed = carrier.chain.place(of_scalars(coordinates[:start]), mechanism.undriven_amounts)
+        carried = of_scalars(coordinates[places.platform])
+        placed = machine.carrier.chain.place(carried, mechanism.undriven_amounts)
         self.platform = placed.end
         is_free = all(is_zero(coordinate) for coordinate in coordinates)
         self.pulls = [pull_of(rod, None if is_free else self.platform) for rod in machine.rods]
@@ -341,10 +341,8 @@ class LegwiseTangent:
         force, self.turning = self._platform_and_rods()
         turning = 0.0 * self.turning if chord else self.turning
         self.legs: list[CondensedLeg] = []
-        for leg in machine.legs:
-            row, wrench = coordinates[start : start + leg.size], coordinates[start + leg.size : start + leg.size + size]
-            start += leg.size + size
-            condensed = CondensedLeg(leg, mechanism, row, wrench, self.platform, chord)
+        for leg, of_leg, of_wrench in zip(machine.legs, places.coordinates, places.wrenches, strict=True):
+            condensed = CondensedLeg(leg, mechanism, coordinates[of_leg], coordinates[of_wrench], self.platform, chord)
             self.legs.append(condensed)
             force, turning = force - condensed.load_taken, turning + condensed.turning
         lines = [[part * (1.0 / pull.length) for part in pull.line] for pull in self.pulls]

@@ -36,21 +36,22 @@ class LegwisePlaces:
     """Places in a list of numbers that has the platform first, and then one leg after the other.
 
     Attributes:
-        twist: places of the platform's twist along its ways.
+        platform: places of what moves the platform: its twist along its ways, or coordinates of the chain that carries
+            it.
         coordinates: places of the coordinates of each leg.
         wrenches: places of the wrench on each leg, behind its coordinates; none in a list of motions alone.
         count: length of the list.
     """
 
-    twist: slice
+    platform: slice
     coordinates: tuple[slice, ...]
     wrenches: tuple[slice, ...]
     count: int
 
     @property
     def motions(self) -> Integers:
-        """Places of the twist and of all coordinates, in the order of a list of motions alone."""
-        return np.concatenate([np.arange(part.start, part.stop) for part in (self.twist, *self.coordinates)])
+        """Places of the platform and of all coordinates, in the order of a list of motions alone."""
+        return np.concatenate([np.arange(part.start, part.stop) for part in (self.platform, *self.coordinates)])
 
     @property
     def all_wrenches(self) -> Integers:
@@ -58,15 +59,15 @@ class LegwisePlaces:
         return np.setdiff1d(np.arange(self.count), self.motions)
 
 
-def _legwise_places(ways: int, sizes: Sequence[int], wrench_size: int) -> LegwisePlaces:
-    """Number the platform's ways, and then of each leg its coordinates and the components of its wrench."""
-    end = ways
+def legwise_places(platform: int, legs: Sequence[ElasticLeg], wrench_size: int) -> LegwisePlaces:
+    """Number what moves the platform, and then of each leg its coordinates and the components of its wrench."""
+    end = platform
     coordinates, wrenches = [], []
-    for size in sizes:
-        coordinates.append(slice(end, end + size))
-        wrenches.append(slice(end + size, end + size + wrench_size))
-        end += size + wrench_size
-    return LegwisePlaces(slice(0, ways), tuple(coordinates), tuple(wrenches), end)
+    for leg in legs:
+        coordinates.append(slice(end, end + leg.size))
+        wrenches.append(slice(end + leg.size, end + leg.size + wrench_size))
+        end += leg.size + wrench_size
+    return LegwisePlaces(slice(0, platform), tuple(coordinates), tuple(wrenches), end)
 
 
 @dataclass(frozen=True)
@@ -125,12 +126,12 @@ class Mechanism:
     def unknown_places(self) -> LegwisePlaces:
         """Places among the unknowns of the equations of equilibrium: of the twist, all coordinates and all wrenches."""
         ways = self.ways.shape[1]
-        return _legwise_places(ways, [leg.size for leg in self.legs], wrench_size=ways)
+        return legwise_places(ways, self.legs, wrench_size=ways)
 
     @cached_property
     def motion_places(self) -> LegwisePlaces:
         """Places in a small motion: of the twist and all coordinates."""
-        return _legwise_places(self.ways.shape[1], [leg.size for leg in self.legs], wrench_size=0)
+        return legwise_places(self.ways.shape[1], self.legs, wrench_size=0)
 
     def given_amounts(self, actuators: Array) -> Array:
         """Return the amounts by which the motions are driven that no coordinate moves [n x amounts].

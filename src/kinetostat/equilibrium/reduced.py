@@ -115,9 +115,8 @@ class Reduced:
 
     @property
     def size(self) -> int:
-        """Number of coordinates; those of legs that close loops are followed by the wrenches that act on these."""
-        ways = self.cut.mechanism.ways.shape[1]
-        return self.cut.carrier.size + sum(leg.size + ways for leg in self.cut.legs)
+        """Number of unknowns, see `Cut.unknown_places`."""
+        return self.cut.unknown_places.count
 
     def start(self) -> tuple[Row, Scalar]:
         """The coordinates after the first steps from the free state, and the square of the last one's size, as `step`.

@@ -302,6 +302,6 @@ def stabilities(equations: Balance) -> Stabilities:
     return Stabilities(
         stable=stable,
         factor=factors,
-        mode=modes[:, places.twist] @ ways.T,
+        mode=modes[:, places.platform] @ ways.T,
         legs=np.stack(legs, axis=1) if legs else np.zeros((len(sound), 0)),
     )

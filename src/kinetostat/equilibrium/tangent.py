@@ -52,14 +52,14 @@ def tangent_matrices(equations: Balance) -> TangentMatrices:
     poses, size = len(equations.residual), ways.shape[1]
     elastic, geometric = np.zeros((2, poses, places.count, places.count))
     closing = np.zeros((poses, size * len(mechanism.legs), places.count))
-    geometric[:, places.twist, places.twist] = -ways.T @ equations.load_change @ ways
+    geometric[:, places.platform, places.platform] = -ways.T @ equations.load_change @ ways
     for number, (leg, terms, moving) in enumerate(zip(mechanism.legs, equations.legs, places.coordinates, strict=True)):
         springs = terms.carrying[:, :, None] * np.eye(leg.size)
         elastic[:, moving, moving] = springs + leg.idle @ np.swapaxes(leg.idle, 1, 2)
         geometric[:, moving, moving] = terms.geometric
         conditions = conditions_of_leg(number, size)
         closing[:, conditions, moving] = ways.T @ terms.rates
-        closing[:, conditions, places.twist] = -np.eye(size)
+        closing[:, conditions, places.platform] = -np.eye(size)
     return TangentMatrices(elastic, geometric, closing)
 
 
@@ -137,8 +137,8 @@ def _motions_of_platform(equations: Balance, closing: Array, rows: Integers) -> 
             inverse[:, moving, conditions] = np.linalg.inv(closing[:, conditions, moving])
         except np.linalg.LinAlgError:
             return None
-    motions = -inverse @ closing[:, :, places.twist]
-    motions[:, places.twist] = np.eye(size)
+    motions = -inverse @ closing[:, :, places.platform]
+    motions[:, places.platform] = np.eye(size)
     sure = np.abs(inverse).max(axis=(1, 2), initial=0.0) * DEPENDENT < 1.0
     return Admissible(rows[sure], motions[sure], inverse[sure])
 
@@ -166,7 +166,7 @@ def solve_at_rest(equations: Balance, right: Array, loaded: bool = True) -> Arra
     legs, rigid = _eliminated_legs(equations, right, loaded)
     if rigid.all():
         return solve_over_admissible(equations, right, loaded)
-    platform_stiffness, load = equations.platform_rates(loaded), right[:, equations.mechanism.unknown_places.twist]
+    platform_stiffness, load = equations.platform_rates(loaded), right[:, equations.mechanism.unknown_places.platform]
     stiffest = np.zeros(len(right))
     for leg in legs:
         stiffest = np.maximum(stiffest, np.abs(leg.stiffness).max(axis=(1, 2)))
@@ -292,7 +292,7 @@ def spring_factor(equations: Balance, part: Admissible) -> Array:
     places = equations.mechanism.motion_places
     stiffnesses = [terms.carrying[part.rows] for terms in equations.legs]
     roots = np.sqrt(np.concatenate(stiffnesses, axis=1)) if stiffnesses else np.zeros((len(part.rows), 0))
-    stretched = roots[:, :, None] * part.motions[:, places.twist.stop :]
+    stretched = roots[:, :, None] * part.motions[:, places.platform.stop :]
     # Householder's reflections keep the digits of small rows below large ones, and lose them above.
     order = np.argsort(-roots, axis=1, kind="stable")
     blocks = [np.take_along_axis(stretched, order[:, :, None], axis=1)]

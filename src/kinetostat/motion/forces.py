@@ -287,7 +287,7 @@ def leg_wrenches(machine: RigidMachine, demand: ForceDemand, forces: Sequence[Sc
             total([rates[i] * force for rates, force in zip(leg.rates_by_twist, differences, strict=True)])
             for i in range(6)
         ]
-        leg_demands.append(Wrench(Vector(*wrench[:3]), Vector(*wrench[3:])))
+        leg_demands.append(Wrench.of(wrench))
         imbalance = imbalance - leg_demands[-1]
     constraints = [row for leg in machine.legs for row in leg.constraints]
     if not constraints:
@@ -296,7 +296,7 @@ def leg_wrenches(machine: RigidMachine, demand: ForceDemand, forces: Sequence[Sc
     result = []
     for leg, leg_wrench in zip(machine.legs, leg_demands, strict=True):
         for row in leg.constraints:
-            leg_wrench = leg_wrench + Wrench(Vector(*row[:3]), Vector(*row[3:])) * next(amounts)
+            leg_wrench = leg_wrench + Wrench.of(row) * next(amounts)
         result.append(leg_wrench)
     return result
 

@@ -237,7 +237,7 @@ def loads_by_acceleration(placed: MachineAtPose) -> list[Twist]:
     rigid, shrink = placed.rigid, 1.0 / placed.rigid.length
     rows: list[list[Scalar]] = [[0.0] * 6 for _ in rigid.drives]
     for way in placed.statics.ways:
-        motion = machine_motion(rigid, BodyMotion(Twist(Vector(*way[:3]), Vector(*way[3:])), NO_MOTION))
+        motion = machine_motion(rigid, BodyMotion(Twist.of(way), NO_MOTION))
         forces = drive_forces(rigid, placed.statics, inertia(rigid, _from_rest(motion)))
         rows = [[a - b * f for a, b in zip(row, way, strict=True)] for row, f in zip(rows, forces, strict=True)]
     levers = [1.0 if drive.slides else rigid.length for drive in rigid.drives]

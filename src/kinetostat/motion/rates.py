@@ -211,10 +211,7 @@ def coordinates_of(
         Vector(yaw_cos * pitch_sin * shrink, yaw_sin * pitch_sin * shrink, 1.0),
     )
     arm = (placement.translation - machine.origin) * (1.0 / machine.length)
-    rates_by_ways = [
-        [_coordinate_rate(name, arm, rows, Twist(Vector(*w[:3]), Vector(*w[3:]))) for w in machine.ways]
-        for name in names
-    ]
+    rates_by_ways = [[_coordinate_rate(name, arm, rows, Twist.of(way)) for way in machine.ways] for name in names]
     dual, _ = dual_basis(rates_by_ways)
     unit_twists = [
         [total([share * way[i] for share, way in zip(shares, machine.ways, strict=True)]) for i in range(6)]
@@ -294,4 +291,4 @@ def _axis_turning(coordinates: Coordinates, twist: Twist, real_twist: Twist) -> 
 def _sum(rows: Sequence[Sequence[Scalar]], factors: Sequence[Scalar]) -> Twist:
     """Return the sum of rows of six, each times its factor, as a twist."""
     parts = [total([row[i] * factor for row, factor in zip(rows, factors, strict=True)]) for i in range(6)]
-    return Twist(Vector(*parts[:3]), Vector(*parts[3:]))
+    return Twist.of(parts)

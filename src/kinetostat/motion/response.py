@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total
 from kinetostat.algebra.screw import Twist
 from kinetostat.algebra.symmetric import SIZE
-from kinetostat.algebra.vector import ZERO, Vector
+from kinetostat.algebra.vector import ZERO
 from kinetostat.kinematics.closing import Joints
 from kinetostat.kinetostatics.quantities import needs_masses, needs_motion
 from kinetostat.kinetostatics.response import Response
@@ -96,7 +96,7 @@ def _motions_under_unit_loads(response: Response, compliances: Sequence[Scalar])
     columns = []
     for row in range(SIZE):
         entries = [response.compliance.entry(i, row) for i in range(SIZE)]
-        column = Twist(Vector(*entries[:3]), Vector(*entries[3:]))
+        column = Twist.of(entries)
         for twist, new, old in zip(response.statics.flexibility, compliances, response.statics.compliance, strict=True):
             if new is not old:  # a loop replaces the spring; the same object needs no correction
                 column = column + twist * ((new - old) * twist.components()[row])

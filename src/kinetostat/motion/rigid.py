@@ -227,7 +227,7 @@ def rigid_machine(machine: Machine, mechanism: Mechanism, plan: MotionPlan, orig
     constraint_twists: list[Row] = []
     if independent:
         constraint_twists, ways, _ = right_inverse(independent)
-    process = Wrench(*_vectors(mechanism.wrench[0]))
+    process = Wrench.of(mechanism.wrench[0])
     for point, force in zip(mechanism.pushed[0], mechanism.forces[0], strict=True):
         vector = Vector(*force)
         process = process + Wrench(Vector(*point).cross(vector), vector)
@@ -243,10 +243,6 @@ def rigid_machine(machine: Machine, mechanism: Mechanism, plan: MotionPlan, orig
         constraint_twists=tuple(constraint_twists),
         plan=plan,
     )
-
-
-def _vectors(components: Sequence[Scalar]) -> tuple[Vector, Vector]:
-    return Vector(*components[:3]), Vector(*components[3:])
 
 
 def _drive(spring: Spring, machine: Machine, length: Scalar) -> RigidDrive:
@@ -296,7 +292,7 @@ def _passive_coordinates(leg: ElasticLeg) -> list[int]:
 
 
 def _rigid_leg(leg: ElasticLeg, plan: LegFreedoms, machine: Machine, mechanism: Mechanism) -> RigidLeg:
-    screws = tuple(Twist(*_vectors(row)) for row in leg.chain.twists[0].tolist())
+    screws = tuple(Twist.of(row) for row in leg.chain.twists[0].tolist())
     coordinates, drives = _coordinates_of_motions(leg, plan.moving, len(mechanism.driven))
     columns = _jacobian_columns(screws, coordinates, len(plan.moving) + len(drives))
     rates_by_twist, constraints = _rates_and_constraints(columns, plan.redundant)
@@ -379,7 +375,7 @@ def plan_of(machine: Machine, configuration: Configuration, joints: Joints | Non
 def _freedoms_of(leg: ElasticLeg, drives: int) -> tuple[LegFreedoms, list[Row]]:
     """Return the freedoms of a leg of a machine with so many drives, and the wrenches that hold the platform."""
     passive = _passive_coordinates(leg)
-    screws = [Twist(*_vectors(row)) for row in leg.chain.twists[0].tolist()]
+    screws = [Twist.of(row) for row in leg.chain.twists[0].tolist()]
     while True:
         coordinates, drives_of_leg = _coordinates_of_motions(leg, passive, drives)
         columns = _jacobian_columns(screws, coordinates, len(passive) + len(drives_of_leg))

@@ -329,7 +329,7 @@ def _linear(response: Response, mechanism: Mechanism, parts: list[int]) -> Array
     if int(response.status) not in REGULAR or not np.isfinite(rows).all():
         return None
     step = newton_step(balance(mechanism, free_state(mechanism)), loaded=False)[0]
-    return _in_si(mechanism, mechanism.ways @ step[mechanism.unknown_places.twist], parts)
+    return _in_si(mechanism, mechanism.ways @ step[mechanism.unknown_places.platform], parts)
 
 
 def _in_si(mechanism: Mechanism, twist: Array, parts: list[int]) -> Array:

@@ -79,7 +79,7 @@ def mass_matrix(equations: Balance) -> Array:
     ways, length = mechanism.ways, mechanism.length
     result = np.zeros((len(length), places.count, places.count))
     of_platform = platform_inertia(mechanism.platform, state.platform, length)
-    result[:, places.twist, places.twist] = ways.T @ of_platform @ ways
+    result[:, places.platform, places.platform] = ways.T @ of_platform @ ways
     amounts = mechanism.given_amounts(state.amounts)
     for leg, coordinates, moving in zip(mechanism.legs, state.coordinates, places.coordinates, strict=True):
         of_leg = result[:, moving, moving]
@@ -187,7 +187,7 @@ def _allowed_motions(
     legs = []
     for number, moving in enumerate(places.coordinates):
         idle = idle_conditions[rows, moving, moving]
-        closing = conditions[rows, conditions_of_leg(number, places.twist.stop), moving]
+        closing = conditions[rows, conditions_of_leg(number, places.platform.stop), moving]
         legs.append(_closed_leg(closing, idle[:, idle.any(axis=(0, 2))]))
     _, sizes, ways = np.linalg.svd(np.concatenate([leg.missed for leg in legs], axis=1), full_matrices=False)
     ranks = np.stack([(sizes > CLOSING_ROUND_OFF).sum(axis=1), *(leg.rank for leg in legs)], axis=1)
@@ -257,7 +257,7 @@ def _over_leg_bases(matrix: Array, rows: Integers, basis: Sequence[Array], place
     motions = list(_places_of_motions(basis))
     size = 1 + max(place.max(initial=-1) for place in motions)
     result = np.zeros((len(rows), size, size))
-    for part, motion, moving in zip(basis, motions, (places.twist, *places.coordinates), strict=True):
+    for part, motion, moving in zip(basis, motions, (places.platform, *places.coordinates), strict=True):
         result[:, motion[:, None], motion] += over_motions(matrix[rows, moving, moving], part)
     return result
 
@@ -392,5 +392,5 @@ def tool_motions(equations: Balance) -> Array:
     shift[3:, :3] = -skew_of(equations.state.platform.translation)[0]
     joule = float(mechanism.force[0] * mechanism.length[0])
     result = np.zeros((6, mechanism.motion_places.count))
-    result[:, mechanism.motion_places.twist] = mechanism.twist_units[0][:, None] * (shift @ ways) / np.sqrt(joule)
+    result[:, mechanism.motion_places.platform] = mechanism.twist_units[0][:, None] * (shift @ ways) / np.sqrt(joule)
     return result

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from kinetostat.algebra.screw import NO_WRENCH, Twist
-from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import Balance, loaded_links
 from kinetostat.equilibrium.elastic_legs import ElasticLeg, Masses
@@ -97,7 +96,7 @@ def _moving_parts(equations: Balance, solution: Modes) -> Iterator[_MovingPart]:
     mechanism, state, shapes = equations.mechanism, equations.state, solution.shapes[:, : solution.mode_count]
     places = mechanism.motion_places
     rates = platform_rates(mechanism.platform, state.platform)
-    yield _MovingPart(mechanism.platform, rates, mechanism.ways @ shapes[places.twist], None)
+    yield _MovingPart(mechanism.platform, rates, mechanism.ways @ shapes[places.platform], None)
     for leg, coordinates, moving in zip(mechanism.legs, state.coordinates, places.coordinates, strict=True):
         placed = leg.chain.place(coordinates, mechanism.given_amounts(state.amounts))
         yield _MovingPart(leg.masses, leg_rates(leg, placed), shapes[moving], leg)
@@ -128,7 +127,7 @@ def small_motions(response: Response, equations: Balance, solution: Modes, numbe
     tool = (solution.tool[:, number] * amount * math.sqrt(energy_unit)).tolist()
     return Deflection(
         NO_WRENCH,
-        Twist(Vector(*tool[:3]), Vector(*tool[3:])),
+        Twist.of(tool),
         tuple(
             replace(
                 link,

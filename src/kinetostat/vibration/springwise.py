@@ -324,9 +324,7 @@ def motions_without_loads(machine: Machine, response: Response, joints: Joints |
     machine_cut = cut(with_share(mechanism_of(machine, response.configuration, joints, None), 0.0))
     if machine_cut is None:
         raise ValueError("loops that cannot be cut have no motions over scalars")
-    ways = machine_cut.mechanism.ways.shape[1]
-    size = machine_cut.carrier.size + sum(leg.size + ways for leg in machine_cut.legs)
-    return SpringMotions(machine_cut, [0.0] * size)
+    return SpringMotions(machine_cut, [0.0] * machine_cut.unknown_places.count)
 
 
 @dataclass(frozen=True)
