@@ -23,8 +23,8 @@ from kinetostat.tolerances import ROUND_OFF_OF_INERTIA
 
 Three = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]
-NO_VECTOR = (0.0, 0.0, 0.0)
-NO_INERTIA = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_VECTOR: Three = (0.0, 0.0, 0.0)
+NO_INERTIA: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 Moment = Annotated[Three, along_axes("moment", "moment about x, y, z")]
 Force = Annotated[Three, along_axes("force", "force along x, y, z")]
 
@@ -37,19 +37,20 @@ class Tool:
         Three, along_axes("length", "tool point T from P in platform axes: x, y, z; K, C and the load are given at T")
     ] = NO_VECTOR
     mass: Annotated[float, Quantity("mass", "mass of the platform and the tool together; 0: not counted")] = 0.0
-    centre_of_mass: Annotated[Three, along_axes("length", "centre of that mass from P in platform axes: x, y, z")] = (
-        NO_VECTOR
-    )
+    centre_of_mass: Annotated[
+        Three, along_axes("length", "centre of mass of platform and tool, from P in platform axes: x, y, z")
+    ] = NO_VECTOR
     payload: Annotated[float, Quantity("mass", "mass of what the tool carries; 0: nothing")] = 0.0
     payload_centre: Annotated[
         Three, along_axes("length", "centre of the payload from the tool point T in platform axes")
     ] = NO_VECTOR
     inertia: Annotated[
-        Six, inertia_tensor("inertia of that mass about its centre, platform axes: xx, yy, zz, xy, xz, yz")
+        Six,
+        inertia_tensor("inertia of platform and tool about centre_of_mass, platform axes: xx, yy, zz, xy, xz, yz"),
     ] = NO_INERTIA
-    payload_inertia: Annotated[Six, inertia_tensor("inertia of the payload about its centre, in the same order")] = (
-        NO_INERTIA
-    )
+    payload_inertia: Annotated[
+        Six, inertia_tensor("inertia of the payload about payload_centre, in the order of inertia")
+    ] = NO_INERTIA
 
 
 @table
@@ -89,9 +90,9 @@ class Drives:
 class ServoGains:
     """Table [servo], in any machine file: the servo loops of all drives, and in [servo.NAME] that of one.
 
-    The transmission between motor and joint has the stiffness of the actuator. The position loop asks
-    for a speed in proportion to the position error, and the velocity loop for a torque in proportion to the speed error
-    and to its integral.
+    The transmission between motor and joint has the stiffness of the actuator. The position loop asks for a speed in
+    proportion to the position error, and the velocity loop for a torque in proportion to the speed error and to its
+    integral.
     """
 
     position_gain: Annotated[float, Quantity("rate", "speed that the position loop asks for, per position error")] = 0.0
@@ -150,7 +151,9 @@ class Load:
         Three, along_axes("acceleration", "gravity along x, y, z: pulls at the platform and, under load, at all links")
     ] = NO_VECTOR
     gravity_angle: Annotated[float, Quantity("angle", "angle by which gravity is turned about gravity_axis")] = 0.0
-    gravity_axis: Annotated[Three, along_axes("direction", "axis of that turn, of any length")] = (1.0, 0.0, 0.0)
+    gravity_axis: Annotated[
+        Three, along_axes("direction", "axis about which gravity_angle turns gravity, of any length")
+    ] = (1.0, 0.0, 0.0)
     min_tension: Annotated[
         float, Quantity("force", "least load of what only pulls or pushes; chooses preloads", unset=math.inf)
     ] = math.inf

@@ -8,7 +8,7 @@ G J or E I a table may stand: { shape = "tube", outer_diameter = "40 mm", inner_
 import math
 from collections.abc import Mapping
 from types import SimpleNamespace
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -105,11 +105,12 @@ class CrossSection:
 
 
 SHEAR_FACTOR = 5.0 / 6.0
-"""Shear factor of a solid rectangle, also of cross-sections of which a file gives moments and no shape."""
+"""Shear factor of a solid rectangle, by the energy of the parabola of shear stress across it; taken as well for
+cross-sections of which a file gives moments and no shape."""
 
 
 def tube(outer: Scalar, inner: Scalar = 0.0, poisson: Scalar = 0.3) -> CrossSection:
-    """A round tube, or a round bar where `inner` is 0; diameters in m.
+    """A round tube, or a round bar where `inner` is 0; diameters in m. A Poisson's ratio of 0.3 is that of most metals.
 
     Source of the shear factor: Cowper 1966, J. Appl. Mech. 33, 335.
     """
@@ -218,12 +219,20 @@ def _profile(shape: str, data: Any) -> CrossSection:
 RIGIDITIES = {"axial rigidity": "axial", "torsional rigidity": "torsion", "bending rigidity": "bending_y"}
 """Fields of `Rigidity` by the kind of quantity that they are."""
 MODULI = ("youngs_modulus", "shear_modulus")
-OF_MATTER = {"density": "density", "expansion": "thermal expansion"}
+"""Fields of a cross-section that may stand in the place of a material."""
+OTHER_PROPERTIES = {"density": "density", "expansion": "thermal expansion"}
 """Other properties of a material, and their kind of quantity."""
 
-Known: TypeAlias = Mapping[str, float | list[float]]
+LinkProperties: TypeAlias = Mapping[str, float | list[float]]
 """Properties of links from cross-sections, beside rigidity: a number of each of `OF_CROSS_SECTIONS`, SI, or a list of
 them for a field with several entries; 0 where it is not known. Empty where no cross-section is written."""
+
+
+class _ReadField(NamedTuple):
+    """A field of [stiffness] with numbers in the place of cross-sections, and what these say of the links besides."""
+
+    rigidity: object
+    properties: LinkProperties
 
 
 def with_rigidities(document: Document, family: Family, origin: str) -> Document:
@@ -238,25 +247,29 @@ def with_rigidities(document: Document, family: Family, origin: str) -> Document
     stiffness = document.get("stiffness")
     if not isinstance(stiffness, dict):
         return document
-    resolved = {
-        name: _numbers_in_place(stiffness[name], RIGIDITIES[quantity.kind], f'"{origin}": stiffness.{name}')
+    read_fields = {
+        name: _read_field(stiffness[name], RIGIDITIES[quantity.kind], f'"{origin}": stiffness.{name}')
         for name, quantity in quantities(family.tables["stiffness"]).items()
         if quantity.kind in RIGIDITIES and name in stiffness
     }
-    result = {**document, "stiffness": {**stiffness, **{name: numbers for name, (numbers, _) in resolved.items()}}}
+    rigidities = {name: field.rigidity for name, field in read_fields.items()}
+    properties = {name: field.properties for name, field in read_fields.items()}
+    result = {**document, "stiffness": {**stiffness, **rigidities}}
     for table in OF_CROSS_SECTIONS:
-        known = _of_links(family, table, {name: numbers for name, (_, numbers) in resolved.items()}, origin)
+        numbers = _of_links(family, table, properties, origin)
         written = document.get(table, {})
-        if known and isinstance(written, dict):
-            result[table] = {**known, **written}
+        if numbers and isinstance(written, dict):
+            result[table] = {**numbers, **written}
     return result
 
 
-def _of_links(family: Family, table: str, resolved: Mapping[str, Known], origin: str) -> dict[str, float | list[float]]:
-    """The numbers of one table of each kind of links whose cross-section is known, SI."""
+def _of_links(
+    family: Family, table: str, properties: Mapping[str, LinkProperties], origin: str
+) -> dict[str, float | list[float]]:
+    """The numbers of one table, by kind of links, that the cross-sections in the fields of [stiffness] say, SI."""
     numbers: dict[str, float | list[float]] = {}
     for kind in family.links:
-        numbers_of_fields = {name: resolved.get(name, {}).get(table, 0.0) for name in kind.rigidities}
+        numbers_of_fields = {name: properties.get(name, {}).get(table, 0.0) for name in kind.rigidities}
         known = {name: number for name, number in numbers_of_fields.items() if np.any(number)}
         for number in known.values():
             if not np.allclose(number, numbers.setdefault(kind.name, number), rtol=SAME_MATTER, atol=0.0):
@@ -267,22 +280,29 @@ def _of_links(family: Family, table: str, resolved: Mapping[str, Known], origin:
     return numbers
 
 
-def _numbers_in_place(value: object, rigidity_name: str, where: str) -> tuple[object, Known]:
-    """A field as numbers, and what else the cross-sections say that stood there."""
+def _read_field(value: object, rigidity_name: str, where: str) -> _ReadField:
+    """Read a field of [stiffness]: a number, a cross-section, or a list of these."""
+    if isinstance(value, dict):
+        return _rigidity(value, rigidity_name, where)
     if not isinstance(value, list):
-        return _rigidity(value, rigidity_name, where) if isinstance(value, dict) else (value, {})
-    entries = [_numbers_in_place(entry, rigidity_name, f"{where}, entry {i}") for i, entry in enumerate(value)]
-    known = {t: [float(np.max(each.get(t, 0.0))) for _, each in entries] for t in OF_CROSS_SECTIONS}
-    return [number for number, _ in entries], known
+        return _ReadField(value, {})
+    entries = [_read_field(entry, rigidity_name, f"{where}, entry {i}") for i, entry in enumerate(value)]
+    properties = {
+        table: [float(np.max(entry.properties.get(table, 0.0))) for entry in entries] for table in OF_CROSS_SECTIONS
+    }
+    return _ReadField([entry.rigidity for entry in entries], properties)
 
 
-def _rigidity(table: Mapping[str, object], rigidity_name: str, where: str) -> tuple[float, Known]:
+def _rigidity(table: Mapping[str, object], rigidity_name: str, where: str) -> _ReadField:
     """One of the rigidities of the cross-section that a table describes, and what else it says of the link."""
     shape, numbers = _shape_and_numbers(table, where)
     data = SimpleNamespace(**numbers)
-    known = map(float, (linear_density_of(shape, data), least_bending_of(shape, data), data.expansion))
-    rigid = rigidity_of(shape, data, shear=False)
-    return float(getattr(rigid, rigidity_name)), dict(zip(OF_CROSS_SECTIONS, known, strict=True))
+    properties = {
+        "linear_density": float(linear_density_of(shape, data)),
+        "bending_rigidity": float(least_bending_of(shape, data)),
+        "expansion": float(data.expansion),
+    }
+    return _ReadField(float(getattr(rigidity_of(shape, data, shear=False), rigidity_name)), properties)
 
 
 def _shape_and_numbers(table: Mapping[str, object], where: str) -> tuple[str, dict[str, float]]:
@@ -299,16 +319,16 @@ def _shape_and_numbers(table: Mapping[str, object], where: str) -> tuple[str, di
     }
     if "material" in rest or not rest.keys() & set(MODULI):
         material = MATERIALS[choice(rest.pop("material", None), MATERIALS, f"{where}: material")]
-        numbers |= {name: getattr(material, name) for name in (*MODULI, *OF_MATTER)}
+        numbers |= {name: getattr(material, name) for name in (*MODULI, *OTHER_PROPERTIES)}
     else:
         numbers |= {name: _size(rest.pop(name, None), "elastic modulus", f"{where}: {name}") for name in MODULI}
-        numbers |= dict.fromkeys(OF_MATTER, 0.0)
-    for name, kind in OF_MATTER.items():
+        numbers |= dict.fromkeys(OTHER_PROPERTIES, 0.0)
+    for name, kind in OTHER_PROPERTIES.items():
         if name in rest:
             numbers[name] = _size(rest.pop(name), kind, f"{where}: {name}")
-    for key in rest:
+    if rest:
         raise InputError(
-            f"{where}: {key} is not known; a {shape} cross-section has "
+            f"{where}: {next(iter(rest))} is not known; a {shape} cross-section has "
             f"{', '.join(SHAPES[shape])}, material, density and expansion."
         )
     if shape == "tube" and not numbers["inner_diameter"] < numbers["outer_diameter"]:

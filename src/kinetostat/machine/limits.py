@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from enum import Enum
 from functools import cached_property, partial
 from itertools import combinations
+from typing import NamedTuple
 
 from kinetostat.algebra.lines import squared_distance
 from kinetostat.algebra.scalar import Scalar, cos
@@ -47,26 +48,40 @@ class Parts:
         return rods(self.legs, self.planar)
 
 
-Measured = Iterator[tuple[int, str, Scalar]]
-"""For each part that a limit is about: its place among the parts, its name, and what the limit is compared with."""
+class Measurement(NamedTuple):
+    """The number that a limit is compared with, of one of the parts that it is about.
+
+    Attributes:
+        place: the number of the part among those that `Parts` lists.
+        part: its name.
+        size: what is compared, in the unit that `Limit.compared` gives.
+    """
+
+    place: int
+    part: str
+    size: Scalar
+
+
+Measured = Iterator[Measurement]
+"""A measurement for each part that a limit is about."""
 
 
 def _leg_lengths(parts: Parts) -> Measured:
-    return ((i, rod.leg, rod.length) for i, rod in enumerate(parts.rods) if rod.telescopic)
+    return (Measurement(i, rod.leg, rod.length) for i, rod in enumerate(parts.rods) if rod.telescopic)
 
 
 def _travels(parts: Parts) -> Measured:
-    return ((i, name, travel) for i, (name, travel) in enumerate(parts.slides))
+    return (Measurement(i, name, travel) for i, (name, travel) in enumerate(parts.slides))
 
 
 def _base_tilts(parts: Parts) -> Measured:
     tilting = [(i, rod) for i, rod in enumerate(parts.rods) if rod.on_base and not parts.planar]
-    return ((i, rod.leg, _squared_cosine(rod, Z_AXIS)) for i, rod in tilting)
+    return (Measurement(i, rod.leg, _squared_cosine(rod, Z_AXIS)) for i, rod in tilting)
 
 
 def _platform_tilts(parts: Parts) -> Measured:
     tilting = [(i, rod) for i, rod in enumerate(parts.rods) if rod.on_platform and not parts.planar]
-    return ((i, rod.leg, _squared_cosine(rod, parts.normal)) for i, rod in tilting)
+    return (Measurement(i, rod.leg, _squared_cosine(rod, parts.normal)) for i, rod in tilting)
 
 
 def _squared_cosine(rod: Rod, normal: Vector) -> Scalar:
@@ -79,13 +94,13 @@ def _clearances(parts: Parts) -> Measured:
     """Squares of the distances between the axes of any two straight legs."""
     for i, (first, other) in enumerate(combinations(parts.rods, 2)):
         distance = squared_distance((first.start, first.end), (other.start, other.end))
-        yield i, f"{first.leg} and {other.leg}", distance
+        yield Measurement(i, f"{first.leg} and {other.leg}", distance)
 
 
 def _loads(parts: Parts, sliding: bool) -> Measured:
     for i, (spring, load) in enumerate(parts.actuators):
         if (spring.joint.point is None) is sliding:
-            yield i, spring.name, load
+            yield Measurement(i, spring.name, load)
 
 
 class About(Enum):
@@ -136,6 +151,10 @@ class Limit:
     def unit(self) -> str:
         return KINDS[self.quantity.kind].unit
 
+    def has_meaning_for(self, parts: Parts) -> bool:
+        """Whether a machine has any part that the limit is about."""
+        return next(self.measure(parts), None) is not None
+
     def scale(self, bound: Scalar, length: Scalar) -> Scalar:
         """The size beside which an excess is round-off: the machine's (m), that of a cosine, or the bound itself."""
         sizes = {About.LENGTH: length, About.TRAVEL: length, About.ANGLE: 1.0}
@@ -143,11 +162,11 @@ class Limit:
 
 
 def _least(kind: str, meaning: str, positive: bool = False) -> Quantity:
-    return Quantity(kind, meaning, positive, unset=-math.inf)
+    return Quantity(kind, meaning, positive=positive, unset=-math.inf)
 
 
 def _most(kind: str, meaning: str, positive: bool = True, most: float = math.inf) -> Quantity:
-    return Quantity(kind, meaning, positive, most=most, unset=math.inf)
+    return Quantity(kind, meaning, positive=positive, most=most, unset=math.inf)
 
 
 def _square(number: Scalar) -> Scalar:
@@ -267,7 +286,7 @@ LIMITS = {
             name="leg_diameter",
             about=About.CLEARANCE,
             quantity=_least(
-                "length", "straight legs, as cylinders this thick between their joints, must not touch", True
+                "length", "straight legs, as cylinders this thick between their joints, must not touch", positive=True
             ),
             at_most=False,
             measure=_clearances,
@@ -344,7 +363,7 @@ def check_limits(limits: object, parts: Parts, origin: str) -> None:
                 f"{ENGINEERING.show(most, high.unit)}: nothing lies between them; exchange or widen them."
             )
     for limit in limits_set(limits):
-        if not any(True for _ in limit.measure(parts)):
+        if not limit.has_meaning_for(parts):
             raise InputError(
                 f'"{origin}": limits.{limit.name} has no meaning here: the machine lacks {limit.needs}; leave it out.'
             )

@@ -1,13 +1,14 @@
 """Links of legs: the straight parts between two passive joints, and the links of a family that have a mass.
 
 Limits of length, angle and clearance are about the straight parts, which are read from the chains of the legs at a
-pose. Of the links with a mass, a family says the names, the fields for their cross-section, their lengths and places;
-`loads` adds up what they weigh. Those of a machine written leg by leg are in its file. Points are in the base frame.
+pose. Of its links with a mass, a family says the names, the fields of their cross-sections, the lengths and the places;
+`loads` adds up what they weigh. Those of a machine written leg by leg are in its file. How links deflect is in `link`.
+Points are in the base frame.
 """
 
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal
 from kinetostat.algebra.vector import ZERO, Vector
@@ -68,28 +69,43 @@ def rods(legs: Sequence[Leg], planar: bool = False) -> list[Rod]:
     return [rod for leg in legs if (rod := _rod(leg, planar)) is not None]
 
 
+class _TurningJoint(NamedTuple):
+    """A passive joint of a leg that turns: its point, m, and the numbers of its elements in the chain."""
+
+    point: Vector
+    elements: list[int]
+
+    @property
+    def has_one_axis(self) -> bool:
+        return len(self.elements) == 1
+
+
+def _turning_joints(chain: Sequence[Element]) -> list[_TurningJoint]:
+    """The passive joints of a chain that turn, from base to platform; axes with one name belong to one joint."""
+    joints: dict[str, _TurningJoint] = {}
+    for number, element in enumerate(chain):
+        for freedom in element.freedoms:
+            if freedom.point is not None:
+                joints.setdefault(freedom.name, _TurningJoint(freedom.point, [])).elements.append(number)
+    return list(joints.values())
+
+
 def _rod(leg: Leg, planar: bool = False) -> Rod | None:
-    axes: dict[str, list[tuple[int, Vector]]] = {}  # number and point of each axis, by the name of its joint
-    for number, element in enumerate(leg.chain):
-        if isinstance(element, Parallelogram):
-            return None
-        for joint in element.freedoms:
-            if joint.point is not None:
-                axes.setdefault(joint.name, []).append((number, joint.point))
-    if len(axes) != 2:
+    joints = _turning_joints(leg.chain)
+    if len(joints) != 2 or any(isinstance(element, Parallelogram) for element in leg.chain):
         return None
-    first, last = axes.values()
-    between = leg.chain[first[-1][0] + 1 : last[0][0]]
-    has_one_axis = len(first) == 1, len(last) == 1
-    if not any(_is_slide(element) for element in between) and has_one_axis != (planar, planar):
+    first, last = joints
+    between = leg.chain[first.elements[-1] + 1 : last.elements[0]]
+    one_axis_each = first.has_one_axis, last.has_one_axis
+    if not any(_is_slide(element) for element in between) and one_axis_each != (planar, planar):
         return None
     return Rod(
         leg=leg.name,
-        start=first[0][1],
-        end=last[0][1],
+        start=first.point,
+        end=last.point,
         telescopic=any(_is_driven_slide(element) for element in between),
-        on_base=not any(_moves(element) for element in leg.chain[: first[0][0]]),
-        on_platform=not any(_moves(element) for element in leg.chain[last[-1][0] + 1 :]),
+        on_base=not any(_moves(element) for element in leg.chain[: first.elements[0]]),
+        on_platform=not any(_moves(element) for element in leg.chain[last.elements[-1] + 1 :]),
     )
 
 
@@ -115,8 +131,24 @@ def driven_slides(chain: Sequence[Element]) -> list[int]:
 
 Ends = Callable[[], tuple[Station, ...]]
 """Gives the ends of a link's axis; it is called where these are needed."""
-PlacedLink = tuple[str, str, Scalar, Ends]
-"""A link: its leg, empty if it belongs to none; its name; its length, m; and its ends."""
+
+
+class PlacedLink(NamedTuple):
+    """A link of a family at a pose.
+
+    Attributes:
+        leg: the leg that it belongs to; empty if it is not counted to one.
+        name: its name, unique within the machine.
+        length: m.
+        ends: gives the ends of its axis.
+    """
+
+    leg: str
+    name: str
+    length: Scalar
+    ends: Ends
+
+
 LinksOf = Callable[[Sequence[Leg], Vector, Any], list[PlacedLink]]
 """From the legs at a pose, P (base frame, m) and the table `geometry` to each link."""
 
@@ -184,75 +216,92 @@ def straight_legs(legs: Sequence[Leg], _tip: Vector, _geometry: Any) -> list[Pla
     """Legs from the first to the last of their passive joints, as long as the pose makes them."""
     ends = [(leg, leg.passive[0].point, leg.passive[-1].point) for leg in actuated_legs(legs)]
     return [
-        (leg.name, leg.name, (end - start).norm(), partial(_stations, leg))
+        PlacedLink(leg.name, leg.name, (end - start).norm(), partial(_ends_of_leg, leg))
         for leg, start, end in ends
         if start is not None and end is not None
     ]
 
 
-def _stations(leg: Leg, segment: int | None = None, bar: int | None = None) -> tuple[Station, ...]:
-    """Both ends of a piece of a leg's path, or of the whole path, which begins at the first joint if that is driven.
-
-    Args:
-        leg: the leg.
-        segment: number of the piece from the base, from 0; None for the whole path.
-        bar: number of the bar, from 0, if the piece is a parallelogram; otherwise None.
-    """
-    stations, first = leg.stations, leg.chain[0]
+def _stations(leg: Leg) -> tuple[Station, ...]:
+    """The stations of a leg's path, which begins at the first joint also where that is driven."""
+    first = leg.chain[0]
     foot = first.joint.point if isinstance(first, Spring) else None
-    if foot is not None and not foot.is_at(stations[0][1]):
-        stations = ((0, foot), *stations)
-    if segment is None:
-        return stations[0], stations[-1]
-    piece = stations[segment : segment + 2]
-    if bar is None:
-        return piece
+    return leg.stations if foot is None or foot.is_at(leg.stations[0][1]) else ((0, foot), *leg.stations)
+
+
+def _ends_of_leg(leg: Leg) -> tuple[Station, ...]:
+    stations = _stations(leg)
+    return stations[0], stations[-1]
+
+
+def _ends_of_piece(leg: Leg, piece: int) -> tuple[Station, ...]:
+    """Both ends of a piece of a leg's path, by its number from the base, from 0."""
+    return _stations(leg)[piece : piece + 2]
+
+
+def _ends_of_bar(leg: Leg, piece: int, bar: int) -> tuple[Station, ...]:
+    """Both ends of a bar, by its number from 0, of a piece that is a parallelogram."""
     pair = next(element for element in leg.chain if isinstance(element, Parallelogram))
-    return tuple((number, point) for (number, _), point in zip(piece, pair.bars[bar], strict=True))
+    carried = zip(_ends_of_piece(leg, piece), pair.bars[bar], strict=True)
+    return tuple((elements, point) for (elements, _), point in carried)
 
 
-def in_each_leg(what: str, field: str, segment: int, bars: int = 1) -> LinksOf:
-    """Links of the actuated legs, in pairs where `bars` is 2; a field of [geometry] has their length or lengths.
+def in_each_leg(link: str, field: str, piece: int) -> LinksOf:
+    """A link of each actuated leg; a field of [geometry] has their length, or one for each leg.
 
     Args:
-        what: the name of the links.
-        field: the field with their length, or with one for each leg.
-        segment: number of their piece of the leg's path, counted from 0 at the base.
-        bars: number of links side by side.
+        link: the name of the links.
+        field: the field with their length or lengths.
+        piece: number of their piece of the leg's path, counted from 0 at the base.
     """
 
     def placed_links(legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[PlacedLink]:
-        names = [what] if bars == 1 else [f"{what} {i}" for i in range(1, bars + 1)]
-        actuated, written = actuated_legs(legs), getattr(geometry, field)
-        lengths = [
-            written[leg.number - 1] if isinstance(written, tuple) and leg.number else written for leg in actuated
-        ]
         return [
-            (leg.name, f"{leg.name} {name}", length, partial(_stations, leg, segment, None if bars == 1 else bar))
-            for leg, length in zip(actuated, lengths, strict=True)
-            for bar, name in enumerate(names)
+            PlacedLink(leg.name, f"{leg.name} {link}", length, partial(_ends_of_piece, leg, piece))
+            for leg, length in _lengths(legs, getattr(geometry, field))
         ]
 
     return placed_links
 
 
-def of_passive_leg(what: str, field: str) -> LinksOf:
+def pair_in_each_leg(bar: str, field: str, piece: int) -> LinksOf:
+    """Both bars of the parallelogram of each actuated leg; arguments as for `in_each_leg`."""
+
+    def placed_links(legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[PlacedLink]:
+        return [
+            PlacedLink(leg.name, f"{leg.name} {bar} {i + 1}", length, partial(_ends_of_bar, leg, piece, i))
+            for leg, length in _lengths(legs, getattr(geometry, field))
+            for i in range(2)
+        ]
+
+    return placed_links
+
+
+def _lengths(legs: Sequence[Leg], written: Any) -> list[tuple[Leg, Scalar]]:
+    """The actuated legs with the length of a link of each: the same for all, or the entry of its number."""
+    return [
+        (leg, written[leg.number - 1] if isinstance(written, tuple) and leg.number else written)
+        for leg in actuated_legs(legs)
+    ]
+
+
+def of_passive_leg(link: str, field: str) -> LinksOf:
     """Links whose lengths are the entries of a field of [geometry]: the path of the leg that has no actuator."""
 
     def placed_links(legs: Sequence[Leg], _tip: Vector, geometry: Any) -> list[PlacedLink]:
         passive = next(leg for leg in legs if leg.number is None)
         lengths = enumerate(getattr(geometry, field))
-        return [("", f"{what} {i + 1}", length, partial(_stations, passive, i)) for i, length in lengths]
+        return [PlacedLink("", f"{link} {i + 1}", length, partial(_ends_of_piece, passive, i)) for i, length in lengths]
 
     return placed_links
 
 
-def from_origin(what: str) -> LinksOf:
-    """One link from the origin of the base frame to P."""
+def from_origin(name: str) -> LinksOf:
+    """One link from the origin of the base frame to P, which is the leg of this name if there is one."""
 
     def placed_links(legs: Sequence[Leg], tip: Vector, _geometry: Any) -> list[PlacedLink]:
-        elements = next((len(leg.chain) for leg in legs if leg.name == what), 0)
-        return [(what, what, tip.norm(), lambda: ((0, ZERO), (elements, tip)))]
+        elements = next((len(leg.chain) for leg in legs if leg.name == name), 0)
+        return [PlacedLink(name, name, tip.norm(), lambda: ((0, ZERO), (elements, tip)))]
 
     return placed_links
 

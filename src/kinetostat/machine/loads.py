@@ -26,6 +26,9 @@ from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import quantities
 
 PLATFORM, PAYLOAD = "platform and tool", "payload"
+"""Names of the masses that move with the platform."""
+MOST_LOADS = 16
+"""Named loads that a machine may have: far more than anybody writes by hand, so that more of them are a mistake."""
 
 
 @dataclass(frozen=True)
@@ -107,20 +110,14 @@ def _members(machine: Machine, configuration: Configuration) -> list[Member]:
 
 def _members_of_kind(kind: LinkKind, machine: Machine, configuration: Configuration) -> Iterator[Member]:
     """The links of one kind of a family in closed form."""
-    columns = [getattr(machine.tables[table], kind.name) for table in LINK_TABLES]
+    columns = [getattr(machine.tables[table], kind.name) for table in LINK_TABLES]  # densities, E I, expansions, rises
     placed = kind.placed_links(configuration.legs, configuration.platform.translation, machine.tables["geometry"])
-    for i, (leg, name, length, ends) in enumerate(placed):
+    for i, link in enumerate(placed):
         density, bending, expansion, rise = (entry if kind.count is None else entry[i] for entry in columns)
         # Bars beside each other lengthen their leg as one of them does: each counts as its share of that.
-        parallel = sum(other == leg for other, *_ in placed) if leg else 1
-        growth = growth_of(expansion, rise, kind.name) * length * (1.0 / parallel)
-        yield Member(
-            leg=leg, name=name, length=length, mass=density * length, bending=bending, growth=growth, ends=ends
-        )
-
-
-MOST_LOADS = 16
-"""Named loads that a machine may have: far more than anybody writes by hand, so that more of them are a mistake."""
+        parallel = sum(other.leg == link.leg for other in placed) if link.leg else 1
+        growth = growth_of(expansion, rise, kind.name) * link.length * (1.0 / parallel)
+        yield Member(**link._asdict(), mass=density * link.length, bending=bending, growth=growth)
 
 
 def family_with_loads(family: Family, document: Document, origin: str) -> Family:
@@ -132,7 +129,7 @@ def family_with_loads(family: Family, document: Document, origin: str) -> Family
     load = document.get("load")
     entries = load.items() if isinstance(load, dict) else ()
     tables = {key: value for key, value in entries if isinstance(value, dict) and key not in quantities(Load)}
-    names = tuple(key for key, value in tables.items() if not _has_numbers_as_keys(value))
+    names = tuple(key for key, value in tables.items() if not _is_misspelt_vector(value))
     if len(names) > MOST_LOADS:
         raise InputError(f'"{origin}": [load] has {len(names)} named loads; at most {MOST_LOADS} are allowed.')
     for name in names:
@@ -144,8 +141,8 @@ def family_with_loads(family: Family, document: Document, origin: str) -> Family
     return _with_loads(family, names) if names else family
 
 
-def _has_numbers_as_keys(table: Mapping[str, Any]) -> bool:
-    """Whether a table replaces entries of a vector, as `--set load.forse.0=1` makes one of a misspelt [load] field."""
+def _is_misspelt_vector(table: Mapping[str, Any]) -> bool:
+    """Whether a table is what `--set load.forse.0=1` makes of a field of [load] that there is not: keys are numbers."""
     return all(key.isdecimal() for key in table)
 
 
@@ -220,23 +217,22 @@ def load_on_platform(machine: Machine, platform: Displacement) -> Wrench:
 
 
 def loads_left_out(machine: Machine, configuration: Configuration) -> str:
-    """Say which loads of a file an answer to first order does not count; empty if it counts all.
+    """Say which loads of a file an analysis of the free machine does not count; empty if it counts all.
 
     Args:
         machine: the machine with its loads.
         configuration: the configuration of the machine.
     """
     weights = [part.mass for part in moving_masses(machine, configuration) if part.name != PLATFORM and part.mass]
-    parts = []
+    rises = vars(machine.tables["temperature_rise"]).values() if "temperature_rise" in machine.tables else ()
+    left_out = []
     if weights and any(gravity_of(machine.tables["load"]).components()):
-        parts.append(f"the weight of the links ({machine.display.show(sum(weights), 'kg')})")
+        left_out.append(f"the weight of the links ({machine.display.show(sum(weights), 'kg')})")
     if any(spring.preload for spring in springs(configuration)):
-        parts.append("preloads")
-    if "temperature_rise" in machine.tables and any(
-        np.any(rise) for rise in vars(machine.tables["temperature_rise"]).values()
-    ):
-        parts.append("the growth of warm links")
-    return f"Not counted here, but by analyze --loaded: {', '.join(parts)}." if parts else ""
+        left_out.append("preloads")
+    if any(np.any(rise) for rise in rises):
+        left_out.append("the growth of warm links")
+    return f"Not counted here, but by analyze --loaded: {', '.join(left_out)}." if left_out else ""
 
 
 def platform_is_loaded(machine: Machine) -> bool:

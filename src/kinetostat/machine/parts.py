@@ -63,7 +63,14 @@ def bent_links(lengths: Sequence[Scalar], stiffness: Sequence[Scalar], bending: 
 
 
 def built_in_bar(
-    name: str, axes: Iterable[Vector], point: Vector, stiffness: Sequence[Scalar], link: tuple[Scalar, Scalar, Scalar]
+    name: str,
+    axes: Iterable[Vector],
+    point: Vector,
+    stiffness: Sequence[Scalar],
+    *,
+    bending: Scalar,
+    torsion: Scalar,
+    length: Scalar,
 ) -> tuple[Spring, ...]:
     """Return the springs of a bar at the end where it is built in: bending about two axes and torsion about the third.
 
@@ -74,9 +81,9 @@ def built_in_bar(
         axes: x and y across the bar, and z along it, base frame.
         point: the point of that end, base frame, m.
         stiffness: the stiffness of its seat about these axes, N·m/rad.
-        link: E I and G J (N·m²) and the length (m) of the bar.
+        bending, torsion: E I and G J of the bar, N·m².
+        length: the length of the bar, m.
     """
-    bending, torsion, length = link
     deflections = (("bending x", bending, 3.0), ("bending y", bending, 3.0), ("torsion", torsion, 1.0))
     return tuple(
         Spring(f"{name} {deflection}", Joint(axis, point), in_series(k, rigidity, length, factor))

@@ -9,7 +9,7 @@ Source: theory (13)-(15) for the cranks.
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from itertools import chain
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from kinetostat.algebra.lines import crank_end, crank_range
 from kinetostat.algebra.scalar import Scalar, cos, reciprocal, sin
@@ -63,23 +63,35 @@ class ThreeLegs(Rings):
     platform_angles: Annotated[Three, joint_angles("platform", 3)]
 
 
-def ends(
+class LegEnds(NamedTuple):
+    """The joints at both ends of the actuated legs, in the order of the legs: base joints, platform joints.
+
+    Points are in the base frame, m.
+    """
+
+    base: Sequence[Vector]
+    platform: Sequence[Vector]
+
+
+def leg_ends(
     rings: Rings,
     base_angles: Sequence[Scalar],
     platform_angles: Sequence[Scalar],
     platform: Displacement,
-    heights: tuple[Scalar, Scalar] = (0.0, 0.0),
-) -> tuple[list[Vector], list[Vector]]:
-    """Base joints and platform joints of the legs in order, base frame, m.
+    base_height: Scalar = 0.0,
+    platform_height: Scalar = 0.0,
+) -> LegEnds:
+    """The ends of legs between two rings.
 
     Args:
         rings: the radii.
         base_angles, platform_angles: the angles of the joints of both rings from x, rad.
         platform: the placement of the platform.
-        heights: z of the base ring in the base frame, and of the platform ring in the platform frame, m.
+        base_height: z of the base ring in the base frame, m.
+        platform_height: z of the platform ring in the platform frame, m.
     """
-    base = ring(rings.base_radius, base_angles, heights[0])
-    return base, [platform.apply(point) for point in ring(rings.platform_radius, platform_angles, heights[1])]
+    top = ring(rings.platform_radius, platform_angles, platform_height)
+    return LegEnds(ring(rings.base_radius, base_angles, base_height), [platform.apply(point) for point in top])
 
 
 def four_joints(radius: Scalar, angle: Scalar) -> list[Vector]:
@@ -94,13 +106,13 @@ class Placement:
 
     Attributes:
         platform: the placement of the platform; its translation is P.
-        joints: base joints and platform joints of the actuated legs, in order.
+        joints: the joints at both ends of the actuated legs.
         passive: the passive legs that guide the platform.
         closures: what the passive legs need to close.
     """
 
     platform: Displacement
-    joints: tuple[Sequence[Vector], Sequence[Vector]]
+    joints: LegEnds
     passive: tuple[Leg, ...] = ()
     closures: tuple[Closure, ...] = ()
 
@@ -152,7 +164,7 @@ CRANK_LINKS = (
 """The links of R-U-S legs, whose rods have the rigidity `leg_axial`."""
 
 
-def outward(base: Sequence[Vector], radius: Scalar, turns: Sequence[Scalar]) -> list[Vector]:
+def outward_directions(base: Sequence[Vector], radius: Scalar, turns: Sequence[Scalar]) -> list[Vector]:
     """Horizontal unit vectors in the vertical planes of the cranks: away from the z axis, each turned about it.
 
     Args:
@@ -245,7 +257,10 @@ def with_struts_or_cranks(
         placement = platform_of(geometry, stiffness, pose)
         bars = CrankLinks(geometry.crank_length, geometry.rod_length, stiffness.crank_bending, stiffness.leg_axial)
         # About this axis the crank points to its side if the platform joint is above the base joint, else away from it.
-        axes = [Z_AXIS.cross(side) for side in outward(placement.joints[0], geometry.base_radius, geometry.crank_turn)]
+        axes = [
+            Z_AXIS.cross(side)
+            for side in outward_directions(placement.joints.base, geometry.base_radius, geometry.crank_turn)
+        ]
         legs, closures = legs_and_closures(
             crank_leg(f"leg {i}", base, tip, axis, k, bars)
             for i, (base, tip, axis, k) in enumerate(zip(*placement.joints, axes, stiffness.actuator, strict=True), 1)

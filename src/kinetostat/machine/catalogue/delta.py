@@ -16,7 +16,7 @@ from kinetostat.algebra.lines import slide_travel
 from kinetostat.algebra.scalar import Scalar, cos, reciprocal, sin
 from kinetostat.algebra.vector import AXES, IDENTITY, Z_AXIS, ZERO, Displacement, Vector, polar, ring
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring
-from kinetostat.machine.links import LinkKind, in_each_leg
+from kinetostat.machine.links import LinkKind, in_each_leg, pair_in_each_leg
 from kinetostat.machine.machine import Closure, Configuration, Family
 from kinetostat.machine.parts import Arm, BarPair, Translations
 from kinetostat.machine.rings import CrankLinks, PlacedLeg, Rings, Three, legs_and_closures, of_three_legs, place_elbow
@@ -254,7 +254,7 @@ FAMILIES = (
         configure=delta,
         links=(
             LinkKind("arms", ("arm_bending", "arm_torsion"), in_each_leg("arm", "arm_length", 0)),
-            LinkKind("bars", ("bar_axial",), in_each_leg("bar", "bar_length", 1, bars=2)),
+            LinkKind("bars", ("bar_axial",), pair_in_each_leg("bar", "bar_length", 1)),
         ),
     ),
     Family(
@@ -266,7 +266,7 @@ FAMILIES = (
             LinkKind(
                 "carriages", ("carriage_bending", "carriage_torsion"), in_each_leg("carriage", "carriage_offset", 0)
             ),
-            LinkKind("rods", ("bar_axial",), in_each_leg("rod", "rod_length", 1, bars=2)),
+            LinkKind("rods", ("bar_axial",), pair_in_each_leg("rod", "rod_length", 1)),
         ),
     ),
     Family(
@@ -276,7 +276,7 @@ FAMILIES = (
         configure=orthoglide,
         links=(
             LinkKind("feet", ("foot_bending", "foot_torsion"), in_each_leg("foot", "foot_length", 0)),
-            LinkKind("bars", ("bar_axial",), in_each_leg("bar", "bar_length", 1, bars=2)),
+            LinkKind("bars", ("bar_axial",), pair_in_each_leg("bar", "bar_length", 1)),
         ),
     ),
 )

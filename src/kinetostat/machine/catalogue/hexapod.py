@@ -9,10 +9,11 @@ from typing import Annotated
 from kinetostat.algebra.scalar import cos, sin
 from kinetostat.algebra.vector import Displacement, Vector, rotation_x, rotation_y, rotation_z
 from kinetostat.machine.leg import RIGID
-from kinetostat.machine.rings import Placement, Rings, ends, joint_angles, with_struts_or_cranks
+from kinetostat.machine.rings import Placement, Rings, joint_angles, leg_ends, with_struts_or_cranks
 from kinetostat.spec.fields import Quantity, table
 
 LEGS = 6
+"""Number of legs, one for each freedom."""
 Six = tuple[float, float, float, float, float, float]
 
 
@@ -39,7 +40,7 @@ class Stiffness:
 
 @table
 class Pose:
-    """Table [pose]: Q = Rz(yaw) Ry(pitch) Rx(roll)."""
+    """Table [pose]; the platform is turned by Rz(yaw) Ry(pitch) Rx(roll) against the base frame."""
 
     x: Annotated[float, Quantity("length", "x of the platform point P")]
     y: Annotated[float, Quantity("length", "y of the platform point P")]
@@ -50,13 +51,24 @@ class Pose:
 
 
 def hexapod_platform(geometry: Geometry, _stiffness: Stiffness, pose: Pose) -> Placement:
-    """The platform, and base and platform joints of its legs; every pose can be reached (SI, base frame)."""
+    """Place the platform and the joints at both ends of its legs (SI, base frame).
+
+    No pose is out of reach: strokes are limits, which are compared elsewhere.
+    """
     turn = rotation_z(cos(pose.yaw), sin(pose.yaw)) @ rotation_y(cos(pose.pitch), sin(pose.pitch))
     turn = turn @ rotation_x(cos(pose.roll), sin(pose.roll))
     platform = Displacement(turn, Vector(pose.x, pose.y, pose.z))
-    heights = geometry.base_height, geometry.platform_height
-    joints = ends(geometry, geometry.base_angles, geometry.platform_angles, platform, heights)
-    return Placement(platform, joints)
+    return Placement(
+        platform,
+        leg_ends(
+            geometry,
+            geometry.base_angles,
+            geometry.platform_angles,
+            platform,
+            base_height=geometry.base_height,
+            platform_height=geometry.platform_height,
+        ),
+    )
 
 
 FAMILIES = with_struts_or_cranks(

@@ -28,13 +28,14 @@ from kinetostat.machine.links import LinkKind, from_origin, of_passive_leg
 from kinetostat.machine.machine import Closure
 from kinetostat.machine.parts import bent_links, built_in_bar, servo
 from kinetostat.machine.rings import (
+    LegEnds,
     Placement,
     Rings,
     Three,
     ThreeLegs,
-    ends,
     four_joints,
     joint_angles,
+    leg_ends,
     of_three_legs,
     with_struts_or_cranks,
 )
@@ -170,7 +171,7 @@ def four_dof_platform(geometry: FourDofGeometry, stiffness: FourDofStiffness, po
     base = four_joints(geometry.base_radius, geometry.base_angle)
     top = four_joints(geometry.platform_radius, geometry.platform_angle)
     closure = Closure("passive leg", (tip - foot).norm(), abs(first - second), first + second)
-    return Placement(platform, (base, [platform.apply(point) for point in top]), (leg,), (closure,))
+    return Placement(platform, LegEnds(base, [platform.apply(point) for point in top]), (leg,), (closure,))
 
 
 @table
@@ -234,7 +235,7 @@ def five_dof_platform(geometry: FiveDofGeometry, stiffness: FiveDofStiffness, po
         geometry,
         stiffness,
     )
-    joints = ends(geometry, geometry.base_angles, geometry.platform_angles, platform)
+    joints = leg_ends(geometry, geometry.base_angles, geometry.platform_angles, platform)
     closure = Closure("passive leg", tip.norm(), abs(first - second), first + second)
     return Placement(platform, joints, (leg,), (closure,))
 
@@ -276,11 +277,18 @@ def ram_platform(geometry: RamGeometry, stiffness: RamStiffness, pose: RamPose) 
     pitch = rotation_y(cos(pose.theta1), sin(pose.theta1))
     tip = Vector(0.0, 0.0, pose.z)
     platform = Displacement(pitch @ rotation_x(cos(pose.theta2), sin(pose.theta2)), tip)
-    bar = stiffness.ram_bending, stiffness.ram_torsion, abs(pose.z)
-    springs = built_in_bar("ram", AXES, ZERO, stiffness.ram, bar)
+    springs = built_in_bar(
+        "ram",
+        AXES,
+        ZERO,
+        stiffness.ram,
+        bending=stiffness.ram_bending,
+        torsion=stiffness.ram_torsion,
+        length=abs(pose.z),
+    )
     slide = servo(Joint(Z_AXIS, None, "ram slide"), "ram actuator", stiffness.ram_actuator)
     leg = Leg("ram", (*springs, slide, *revolutes(tip, (Y_AXIS, pitch.x), "ram Hooke joint")))
-    return Placement(platform, ends(geometry, geometry.base_angles, geometry.platform_angles, platform), (leg,))
+    return Placement(platform, leg_ends(geometry, geometry.base_angles, geometry.platform_angles, platform), (leg,))
 
 
 @table
@@ -319,11 +327,18 @@ def tube_platform(geometry: TubeGeometry, stiffness: TubeStiffness, pose: TubePo
     pitch = rotation_y(cos(pose.theta1), sin(pose.theta1))
     turn = pitch @ rotation_x(cos(pose.theta2), sin(pose.theta2))
     platform = Displacement(turn, turn.z * pose.length)
-    bar = stiffness.tube_bending, stiffness.tube_torsion, pose.length
-    springs = built_in_bar("tube", (turn.x, turn.y, turn.z), platform.translation, stiffness.tube, bar)
+    springs = built_in_bar(
+        "tube",
+        (turn.x, turn.y, turn.z),
+        platform.translation,
+        stiffness.tube,
+        bending=stiffness.tube_bending,
+        torsion=stiffness.tube_torsion,
+        length=pose.length,
+    )
     slide = servo(Joint(turn.z, None, "tube slide"), "tube actuator", stiffness.tube_actuator)
     leg = Leg("tube", (*revolutes(ZERO, (Y_AXIS, pitch.x), "tube Hooke joint"), slide, *springs))
-    return Placement(platform, ends(geometry, geometry.base_angles, geometry.platform_angles, platform), (leg,))
+    return Placement(platform, leg_ends(geometry, geometry.base_angles, geometry.platform_angles, platform), (leg,))
 
 
 PASSIVE_LINKS = LinkKind(

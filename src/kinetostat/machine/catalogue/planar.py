@@ -17,10 +17,11 @@ from kinetostat.machine.machine import Configuration, Family, Plane
 from kinetostat.machine.parts import Arm, if_elastic, per_length, two_force_legs
 from kinetostat.machine.rings import (
     CrankLinks,
+    LegEnds,
     PlacedLeg,
     Three,
     ThreeLegs,
-    ends,
+    leg_ends,
     legs_and_closures,
     of_three_legs,
     place_elbow,
@@ -37,10 +38,10 @@ class Pose:
     angle: Annotated[float, Quantity("angle", "rotation of the platform about z")]
 
 
-def platform_and_joints(geometry: ThreeLegs, pose: Pose) -> tuple[Displacement, tuple[list[Vector], list[Vector]]]:
+def platform_and_joints(geometry: ThreeLegs, pose: Pose) -> tuple[Displacement, LegEnds]:
     """The platform in the x-y plane, and base and platform joints of its legs (SI, base frame)."""
     platform = Displacement(rotation_z(cos(pose.angle), sin(pose.angle)), Vector(pose.x, pose.y, 0.0))
-    return platform, ends(geometry, geometry.base_angles, geometry.platform_angles, platform)
+    return platform, leg_ends(geometry, geometry.base_angles, geometry.platform_angles, platform)
 
 
 @table

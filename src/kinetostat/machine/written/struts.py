@@ -7,7 +7,6 @@ in the base frame.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import chain
 from typing import Any
 
 from kinetostat.algebra.scalar import Scalar, reciprocal
@@ -21,7 +20,7 @@ from kinetostat.spec.errors import InputError
 
 AXIAL = "axial_rigidity"
 """The field that gives E A of the rod; `section` names a cross-section instead."""
-UNPOINTED = ("prismatic", "fixed")
+JOINTS_WITHOUT_CENTRE = ("prismatic", "fixed")
 """Types of joints at whose point no rod ends: it travels, or nothing turns there."""
 
 
@@ -43,17 +42,17 @@ class StrutRod:
 
     @property
     def freedoms(self) -> tuple[Joint, ...]:
-        """None."""
+        """A rod has no freedom."""
         return ()
 
     @property
     def springs(self) -> tuple[Spring, ...]:
-        """None, as long as its length is not known."""
+        """There is no spring until a pose gives the length of the rod; see `spring`."""
         return ()
 
     @property
     def path(self) -> tuple[Vector, ...]:
-        """Nothing that a drawing shows."""
+        """A rod adds no point to a drawing: it lies between those of joints."""
         return ()
 
     def displaced(self, motion: Displacement) -> "StrutRod":
@@ -78,7 +77,7 @@ def rod_of(name: str, slide: JointPlan, actuator: Spring, data: Any, plan: Plan,
     """
     section = slide.cross_section
     shape, sizes = (plan.shapes[section], tables[f"sections.{section}"]) if section else ("", None)
-    axial = rigidity_of(shape, sizes, False).axial if section else data.axial_rigidity
+    axial = rigidity_of(shape, sizes, shear=False).axial if section else data.axial_rigidity
     return StrutRod(PartName(name, f"{slide.name} rod"), actuator, Vector(*data.point), axial)
 
 
@@ -90,14 +89,17 @@ def with_rods(steps: Sequence[Step], placed: Sequence[Element | StrutRod]) -> tu
         placed: the same elements at a pose, base frame.
     """
     centres = [
-        getattr(element, "joint", element).path if step.moves else ()
-        for step, element in zip(steps, placed, strict=True)
+        (number, centre)
+        for number, (step, element) in enumerate(zip(steps, placed, strict=True))
+        if step.moves
+        for centre in (element.joint if isinstance(element, Spring) else element).path
     ]
     elements: list[Element] = []
-    for i, element in enumerate(placed):
+    for number, element in enumerate(placed):
         if isinstance(element, StrutRod):
-            start = [element.start, *chain.from_iterable(centres[:i])][-1]
-            elements.append(element.spring(start, next(chain.from_iterable(centres[i:]))))
+            before = [centre for place, centre in centres if place < number]
+            after = [centre for place, centre in centres if place > number]  # `check_strut` has made sure of one
+            elements.append(element.spring(before[-1] if before else element.start, after[0]))
         else:
             elements.append(element)
     return tuple(elements)
@@ -117,9 +119,9 @@ def check_strut(joints: Sequence[JointPlan], place: int, where: str) -> None:
     joint = joints[place]
     field = "section" if joint.cross_section else AXIAL
     if joint.kind != "prismatic" or not joint.actuated:
-        what = "not actuated" if joint.kind == "prismatic" else joint.kind
+        reason = "not actuated" if joint.kind == "prismatic" else joint.kind
         raise InputError(
-            f"{where} is {what} and has {field}; only an actuated prismatic joint is a strut whose rod stretches. "
+            f"{where} is {reason} and has {field}; only an actuated prismatic joint is a strut whose rod stretches. "
             f"Leave {field} out, or give the section to a link of the leg."
         )
     moving_before = [other.kind for other in joints[:place] if other.kind != "fixed"]
@@ -128,7 +130,7 @@ def check_strut(joints: Sequence[JointPlan], place: int, where: str) -> None:
             f"{where} has {field}, but only slides come before it, so that nothing says where its rod begins; leave "
             f"{field} out and write the rod's stiffness into stiffness."
         )
-    if all(other.kind in UNPOINTED for other in joints[place + 1 :]):
+    if all(other.kind in JOINTS_WITHOUT_CENTRE for other in joints[place + 1 :]):
         raise InputError(
             f"{where} has {field}, but no joint that turns comes after it, so that nothing says where its rod ends; "
             f"leave {field} out and write the rod's stiffness into stiffness."

@@ -1,4 +1,7 @@
-"""Files of machines written leg by leg: the tables of numbers that a plan has. Their JSON Schema is in `schema`."""
+"""Files of machines written leg by leg: the tables of numbers that a plan has, and the fields in them.
+
+The words of such files are in `plan`, the JSON Schema of all plans is in `machine.file_schema`.
+"""
 
 from kinetostat.machine.cross_section import MATERIALS, SHAPE_KINDS, SHAPES
 from kinetostat.machine.series import label
@@ -26,9 +29,9 @@ MATERIAL_FIELDS = {
 
 WEIGHT = {
     "mass": Field(Quantity("mass", "mass of the link, in the place of what its cross-section weighs")),
-    "centre_of_mass": Field(along_axes("length", "centre of that mass, base frame at the home pose")),
+    "centre_of_mass": Field(along_axes("length", "centre of mass of the link, base frame at the home pose")),
     "inertia": Field(
-        inertia_tensor("inertia of that mass about its centre, base axes at the home pose: xx, yy, zz, xy, xz, yz")
+        inertia_tensor("inertia of the link about centre_of_mass, base axes at the home pose: xx, yy, zz, xy, xz, yz")
     ),
 }
 """Fields of a link about its mass; each needs those before it."""
@@ -81,7 +84,7 @@ def _shape_fields(shape: str, material: str) -> dict[str, Field]:
         name: Field(Quantity(SHAPE_KINDS[name], name.replace("_", " "), positive=name != "inner_diameter"))
         for name in SHAPES[shape]
     }
-    # Of a known material the file may leave out what the catalogue says.
+    # Of a known material the file may leave out what the catalogue says; no material has a temperature.
     material_data = MATERIALS.get(material)
     fields |= {
         name: Field(field.quantity, getattr(material_data, name, field.default))
