@@ -24,7 +24,7 @@ from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.directions import unit_direction
-from kinetostat.studies.vibration import HIGHEST, Vibration, modes
+from kinetostat.studies.vibration import HIGHEST_FREQUENCY, Vibration, modes
 from kinetostat.tolerances import UNFELT
 from kinetostat.vibration.modes import Modes
 from kinetostat.vibration.receptance import StateSpaceMatrices
@@ -105,8 +105,8 @@ class Servo(AnswerInState):
         if self.loops is None:
             raise InputError(f"{self.machine.name} has no servo response at this pose: {self.message}")
         row = np.asarray(frequencies, dtype=float).reshape(-1)
-        if not (np.abs(row) <= HIGHEST).all():
-            raise InputError(f"frequencies must be numbers in Hz, up to {HIGHEST:g}.")
+        if not (np.abs(row) <= HIGHEST_FREQUENCY).all():
+            raise InputError(f"frequencies must be numbers in Hz, up to {HIGHEST_FREQUENCY:g}.")
         return self.loops.receptance(row)
 
 

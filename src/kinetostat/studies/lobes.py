@@ -36,9 +36,9 @@ CURVE_SPEEDS = 1200
 SLOWEST_SHARE = 0.08
 """Slowest speed of the curve as a share of the fastest, if none is given: there, eight periods of
 the chatter pass from edge to edge, and lobes run into one."""
-FASTEST = 1.6
-"""Fastest speed of the curve, in turns in which an edge passes once per period of the chatter, if none is given: the
-last lobe ends at 1."""
+FASTEST_MULTIPLE = 1.6
+"""Fastest speed of the curve as a multiple of that at which an edge passes once per period of the chatter, if none is
+given: the last lobe ends at 1."""
 MOST_POSES = 2000
 """Poses of a range: each takes some milliseconds, as a machine of its own."""
 MOST_OBLIQUE = 1e-6
@@ -222,6 +222,7 @@ def _entry_and_leaving(entry: float | str | None, leaving: float | str | None) -
 
 
 def _angle(value: float | str, name: str) -> float:
+    """An angle from a number, rad, or a text with a unit; `name` is the argument, for messages."""
     try:
         return Quantity("angle", "").number(value)
     except UnitError as error:
@@ -236,8 +237,8 @@ def _lobes_of(
 ) -> Lobes:
     """The widths that are stable at all poses with vibrations: at each speed the least of theirs."""
     all_borders = [(at_pose.borders(engagement), at_pose) for at_pose in vibrations]
-    pairs = [(border, at_pose) for border, at_pose in all_borders if border is not None]
-    if not pairs:
+    known_borders = [(border, at_pose) for border, at_pose in all_borders if border is not None]
+    if not known_borders:
         first, nothing = vibrations[0].vibration, np.zeros(0)
         message = first.message if len(vibrations) == 1 else "At none of these poses does the machine have vibrations."
         return Lobes(
@@ -250,11 +251,12 @@ def _lobes_of(
             widths=nothing,
             poses=0,
         )
-    worst_border, worst = min(pairs, key=lambda pair: pair[0].least[0])
+    worst_border, worst = min(known_borders, key=lambda pair: pair[0].least[0])
     least, frequency = worst_border.least
+    # Where every width is stable, nothing chatters: the curve then reaches to the highest frequency that was tried.
     chatter = frequency if math.isfinite(frequency) else float(worst_border.frequencies[-1])
     speeds = _speeds(chatter, engagement.teeth, ends)
-    widths = np.min([border.widths_at(speeds) for border, _ in pairs], axis=0)
+    widths = np.min([border.widths_at(speeds) for border, _ in known_borders], axis=0)
     widest = int(np.argmax(widths))
     return Lobes(
         state=state,
@@ -267,10 +269,10 @@ def _lobes_of(
         least=least,
         frequency=frequency,
         best=(float(speeds[widest]), float(widths[widest])) if widths[widest] > least else None,
-        assumed=any(at_pose.vibration.assumed for _, at_pose in pairs),
-        poses=len(pairs),
+        assumed=any(at_pose.vibration.assumed for _, at_pose in known_borders),
+        poses=len(known_borders),
         worst=worst.pose,
-        tool=pairs[0][1].vibration.tool,
+        tool=worst.vibration.tool,
     )
 
 
@@ -280,9 +282,12 @@ def _speeds(chatter: float, teeth: int, ends: tuple[float | None, float | None])
     Args:
         chatter: frequency of the chatter, Hz.
         teeth: edges that pass in a turn.
-        ends: slowest and fastest speed, as they are given.
+        ends: slowest and fastest speed, as they are given; None where not.
+
+    Raises:
+        InputError: the slowest is not below the fastest.
     """
-    fastest = ends[1] or FASTEST * chatter / teeth
+    fastest = ends[1] or FASTEST_MULTIPLE * chatter / teeth
     speeds = np.linspace(ends[0] or SLOWEST_SHARE * fastest, fastest, CURVE_SPEEDS)
     if speeds[0] >= speeds[-1]:
         raise InputError(

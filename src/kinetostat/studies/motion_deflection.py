@@ -26,10 +26,10 @@ STEPS = 8192
 """Equal steps of a motion in which modes are followed. A mode that swings 400 times in the motion has 20 of them in a
 period, so that its greatest amount is missed by 1 % at most; the steps themselves have no error where loads change
 evenly within them."""
-EXCITED = 0.01
+EXCITED_SHARE = 0.01
 """Share of the greatest deflection at rest from which a mode counts as excited: a lesser one changes the deflection by
 less than masses and damping ratios are known to."""
-CRITICAL = 1e-6
+LEAST_FROM_CRITICAL = 1e-6
 """Least distance of a damping ratio from critical damping, where both poles of a swing are one and their difference has
 no digits left; at this distance it loses three, and the swing is wrong by a millionth."""
 
@@ -54,19 +54,19 @@ class ModesAlong:
 
 
 def deflections(machine: Machine, motion: Motion, forces: PathForces) -> Array:
-    """Deflections of the tool point by C at each pose and the wrench there [n x 6]."""
-    result = np.full((motion.path.size, 6), np.nan)
+    """Deflections of the tool point by C at each pose and the wrench there [n x 6]; NaN where a pose has no answer."""
+    all_deflections = np.full((motion.path.size, 6), np.nan)
     for start in range(0, motion.path.size, NUMPY_SLAB):
-        part = slice(start, min(start + NUMPY_SLAB, motion.path.size))
-        count = part.stop - start
-        columns = {path: rows[part] for path, rows in motion.path.columns.items()}
+        slab = slice(start, min(start + NUMPY_SLAB, motion.path.size))
+        count = slab.stop - start
+        columns = {path: column[slab] for path, column in motion.path.columns.items()}
         with np.errstate(all="ignore"):
             response = states_at(machine, columns, count).free
             entries = [[np.broadcast_to(entry, count) for entry in row] for row in response.compliance.rows()]
-            deflection = np.einsum("ijn,jn->ni", np.array(entries, dtype=float), forces.wrench[:, part])
+            deflection = np.einsum("ijn,jn->ni", np.array(entries, dtype=float), forces.wrench[:, slab])
             has_answer = np.broadcast_to(np.asarray(response.status) == Status.OK, count)
-        result[part] = np.where(has_answer[:, None] & np.isfinite(deflection), deflection, np.nan)
-    return result
+        all_deflections[slab] = np.where(has_answer[:, None] & np.isfinite(deflection), deflection, np.nan)
+    return all_deflections
 
 
 def modes_along(state: MachineState, form: RigidForm, motion: Motion, wrench: Array) -> ModesAlong | None:
@@ -101,7 +101,7 @@ def modes_along(state: MachineState, form: RigidForm, motion: Motion, wrench: Ar
     surplus = amounts - loads
     greatest_at_rest = np.linalg.norm(shapes[3:] @ loads, axis=0).max()
     # All of a mode moves in one ratio, so that the displacement of the tool point measures its rotations as well.
-    excited = displacements * np.abs(surplus).max(axis=1) > EXCITED * greatest_at_rest
+    excited = displacements * np.abs(surplus).max(axis=1) > EXCITED_SHARE * greatest_at_rest
     # What is left swings about the deflection at rest; the amplitude of a mode has its distance and its rate together.
     amplitudes = displacements * np.hypot(amounts[:, -1] - last_load, final_rates / rates)
     return ModesAlong(
@@ -136,12 +136,13 @@ def swings_under(loads: Array, rates: Array, ratios: Array, step: float, before:
     Returns:
         Amounts q [m x n], and the rates of these at the end [m].
     """
-    ratios = np.where(np.abs(ratios - 1.0) < CRITICAL, 1.0 + CRITICAL, ratios)
+    ratios = np.where(np.abs(ratios - 1.0) < LEAST_FROM_CRITICAL, 1.0 + LEAST_FROM_CRITICAL, ratios)
     roots = np.sqrt((ratios**2 - 1.0).astype(complex))
     slow_poles, fast_poles = rates * (roots - ratios), -rates * (roots + ratios)
     poles: Complex = np.concatenate([slow_poles, fast_poles])
-    decay, z = np.exp(poles * step), poles * step
-    phi_1 = np.expm1(z) / z
+    z = poles * step
+    decay = np.exp(z)
+    phi_1 = np.expm1(z) / z  # the functions phi of the exponential integrator, as the source names them
     phi_2 = (phi_1 - 1.0) / z
     loads_of_poles = np.vstack([loads, loads]).T
     increments = step * ((phi_1 - phi_2) * loads_of_poles[:-1] + phi_2 * loads_of_poles[1:])

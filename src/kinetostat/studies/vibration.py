@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array, Complex
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.state import AnswerInState, MachineState, state_of
@@ -46,9 +47,9 @@ from kinetostat.vibration.shares import effective_masses, kinetic_shares, small_
 
 MOST_SHOWN = 12
 """Modes that are shown, two sets of the six of a rigid platform; higher ones add to the response all the same."""
-NOTHING_RINGS = "There are no natural frequencies: all that could move is rigid."
+NOTHING_VIBRATES = "There are no natural frequencies: all that could move is rigid."
 """The answer where no spring deflects."""
-TOO_DIFFERENT = (
+HIDDEN_BY_ROUND_OFF = (
     "Nothing can be said about vibrations at this pose: the softest motion is so much softer than the others, more "
     'than 1e12 times, that round-off hides it. Write "rigid" for springs that are meant to be, or make the softest '
     "one stiffer."
@@ -65,9 +66,9 @@ REACH_ABOUT_A_MODE = 6.0
 the response of the mode has fallen to a sixth."""
 LEAST_DRAWN_RATIO = 1e-4
 """Damping ratio below which frequencies about a mode lie as those of this one: no picture shows a sharper peak."""
-HIGHEST = 1e20
+HIGHEST_FREQUENCY = 1e20
 """Highest frequency, Hz: its square is still a number."""
-RANGE_OF_CURVES = (0.2, 1.6)
+LOWEST_OF_CURVES, HIGHEST_OF_CURVES = 0.2, 1.6
 """Ends of the curves as multiples of the lowest and of the highest frequency that is drawn, beyond which a response has
 little but that of a spring and that of a mass."""
 
@@ -158,12 +159,14 @@ class Vibration(AnswerInState):
             frequencies: Hz.
 
         Raises:
-            InputError: the pose has no answer, or a frequency is not a number up to `HIGHEST` or not one of the tool.
+            InputError: the pose has no answer, or a frequency is above `HIGHEST_FREQUENCY` or not one of the tool.
         """
         solution, damping = self._solution()
         for place, frequency in enumerate(frequencies):
-            if not abs(frequency) <= HIGHEST:
-                raise InputError(f"frequencies[{place}] is {frequency:g}; give numbers in Hz, up to {HIGHEST:g}.")
+            if not abs(frequency) <= HIGHEST_FREQUENCY:
+                raise InputError(
+                    f"frequencies[{place}] is {frequency:g}; give numbers in Hz, up to {HIGHEST_FREQUENCY:g}."
+                )
         row = np.asarray(frequencies, dtype=float).reshape(-1)
         of_machine = receptance(solution, damping, row) if self.loops is None else self.loops.receptance(row)
         if self.tool is None:
@@ -211,17 +214,22 @@ class Vibration(AnswerInState):
         tried = tried_frequencies(solution.frequencies, damping.ratios(solution))
         if self.loops is not None:
             poles = self.loops.poles()
-            swinging = poles[poles.imag > 0.0]
-            order = np.argsort(np.abs(swinging))
-            sizes = np.abs(swinging[order])
-            of_loops = tried_frequencies(sizes / (2.0 * math.pi), np.abs(swinging[order].real) / sizes)
+            swinging = poles[poles.imag > 0.0]  # of each pair of poles, one
+            swinging = swinging[np.argsort(np.abs(swinging))]
+            rates = np.abs(swinging)
+            of_loops = tried_frequencies(rates / (2.0 * math.pi), np.abs(swinging.real) / rates)
             tried = np.unique(np.concatenate([tried, of_loops]))
         if self.tool is None:
             return tried
-        every = np.unique(np.concatenate([tried, self.tool.search_frequencies]))
-        return every[(every >= self.tool.frequencies[0]) & (every <= self.tool.frequencies[-1])]
+        tried = np.unique(np.concatenate([tried, self.tool.search_frequencies]))
+        return tried[(tried >= self.tool.frequencies[0]) & (tried <= self.tool.frequencies[-1])]
 
     def _solution(self) -> tuple[Modes, Damper]:
+        """All modes and their damping.
+
+        Raises:
+            InputError: the pose has no answer.
+        """
         if self.solution is None or self.damping is None:
             raise InputError(f"{self.machine.name} has no vibrations at this pose: {self.message}")
         return self.solution, self.damping
@@ -305,8 +313,10 @@ def _modes_with_closed_loops(state: MachineState) -> Vibration:
 
 
 def _modes_of(state: MachineState) -> Vibration:
+    """The modes of a machine in its state, or the reason why it has none."""
     machine, names, status = state.machine, state.machine.family.component_names, state.status
     refuse_unknown_mass(machine, "modes", state.configuration)
+    # Where springs alone hold nothing, loads may still do so: as a weight holds a pendulum.
     held_by_loads = machine.loaded and status is Status.SINGULAR and int(state.free.place_status) == Status.OK
     if status is not Status.OK and not held_by_loads:
         return Vibration(state, status, state.refusal, names)
@@ -316,13 +326,14 @@ def _modes_of(state: MachineState) -> Vibration:
         return Vibration(state, Status.NO_REST, message, names, loaded=True)
     solution = solved_modes(equations)
     if solution is None:
-        return Vibration(state, Status.SINGULAR, TOO_DIFFERENT, names)
+        return Vibration(state, Status.SINGULAR, HIDDEN_BY_ROUND_OFF, names)
     if not solution.inverse_squares.size:
-        return Vibration(state, Status.OK, NOTHING_RINGS, names)
+        return Vibration(state, Status.OK, NOTHING_VIBRATES, names)
     return _vibration(state, equations, solution)
 
 
 def _vibration(state: MachineState, equations: Balance, solution: Modes) -> Vibration:
+    """The answer for a machine whose modes are solved for; without damping in its file, with a usual one."""
     machine, response = state.machine, state.free
     table = machine.tables["damping"]
     has_friction = any(leg.dampers.any() for leg in equations.mechanism.legs)
@@ -330,8 +341,7 @@ def _vibration(state: MachineState, equations: Balance, solution: Modes) -> Vibr
     ratio = ASSUMED_RATIO if assumed else table.ratio
     damping = damper(equations, solution, ratio, table.per_mass, table.per_stiffness)
     masses = moving_masses(machine, response.configuration)
-    masses_known = [float(part.mass) for part in masses if part.mass is not None] + [machine.tables["tool"].payload]
-    uncounted = tuple(part.name for part in masses if part.mass is None)
+    known_masses = [float(part.mass) for part in masses if part.mass is not None] + [machine.tables["tool"].payload]
     shown = tuple(_modes(machine, response, equations, solution, damping))
     return Vibration(
         state=state,
@@ -340,8 +350,8 @@ def _vibration(state: MachineState, equations: Balance, solution: Modes) -> Vibr
         components=machine.family.component_names,
         loaded=machine.loaded,
         modes=shown,
-        moving_mass=sum(masses_known),
-        uncounted=uncounted,
+        moving_mass=sum(known_masses),
+        uncounted=tuple(part.name for part in masses if part.mass is None),
         assumed=assumed,
         solution=solution,
         damping=damping,
@@ -368,39 +378,44 @@ def _message(machine: Machine, response: Response, shown: Sequence[Mode]) -> str
 def _directions(machine: Machine, together: Sequence[Mode], length: float) -> list[str]:
     """As many components as there are modes: those in which all of them together move the tool most."""
     names = machine.family.component_names
-    scales = np.array([length if len(name) == 2 else 1.0 for name in names])
+    scales = np.array([length if _is_rotation(name) else 1.0 for name in names])
     sizes = np.linalg.norm([mode.tool for mode in together], axis=0) * scales
     return [names[place] for place in sorted(np.argsort(-sizes, kind="stable")[: len(together)])]
+
+
+def _is_rotation(component: str) -> bool:
+    return component.startswith("r")
 
 
 def _motions(components: Sequence[str]) -> str:
     """Components as motions: "moves along x", "turns about x and about y"."""
     phrases: list[str] = []
     for name in dict.fromkeys(components):
-        verb, way = ("turns", f"about {name[1:]}") if len(name) == 2 else ("moves", f"along {name}")
+        verb, way = ("turns", f"about {name[1:]}") if _is_rotation(name) else ("moves", f"along {name}")
         phrases.append(way if any(text.startswith(verb) for text in phrases) else f"{verb} {way}")
     return " and ".join(phrases)
 
 
 def _modes(machine: Machine, response: Response, equations: Balance, solution: Modes, damping: Damper) -> list[Mode]:
-    shown = slice(0, min(solution.mode_count, MOST_SHOWN))
-    strains, kinetics = strain_shares(equations, solution.shapes[:, shown]), kinetic_shares(equations, solution)
-    parts, length = list(machine.family.components), float(response.configuration.length)
+    """The modes that are shown, from the lowest frequency, with the shares of parts in their energies."""
+    count = min(solution.mode_count, MOST_SHOWN)
+    strains, kinetics = strain_shares(equations, solution.shapes[:, :count]), kinetic_shares(equations, solution)
+    components, ratios = list(machine.family.components), damping.ratios(solution)
+    lengths = np.array([float(response.configuration.length)] * 3 + [1.0] * 3)  # turns count at the machine's length
     effective, springs = effective_masses(equations, solution), springs_of(response.configuration)
-    result = []
-    for k in range(solution.mode_count)[shown]:
+    shown = []
+    for k in range(count):
         omega = 1.0 / math.sqrt(solution.inverse_squares[k])
         twist = solution.tool[:, k] * omega  # of a modal mass of 1 kg
-        sizes = np.abs(twist) * np.array([length] * 3 + [1.0] * 3)
-        largest = max(parts, key=lambda part: sizes[part])
+        largest = max(components, key=(np.abs(twist) * lengths).__getitem__)
         mass = float(1.0 / twist[largest] ** 2) if twist[largest] else math.inf
         strain = {name: float(shares[k]) for name, shares in strains.items()}
-        result.append(
+        shown.append(
             Mode(
                 frequency=float(solution.frequencies[k]),
-                ratio=float(damping.ratios(solution)[k]),
-                tool=twist[parts],
-                direction=_names(machine)[largest],
+                ratio=float(ratios[k]),
+                tool=twist[components],
+                direction=COMPONENTS[largest],
                 modal_mass=mass,
                 modal_stiffness=mass * omega**2,
                 effective_mass=np.array(effective[k]),
@@ -410,12 +425,7 @@ def _modes(machine: Machine, response: Response, equations: Balance, solution: M
                 shape=small_motions(response, equations, solution, k),
             )
         )
-    return result
-
-
-def _names(machine: Machine) -> dict[int, str]:
-    """Names of the components that a machine has, by their place in rx ry rz x y z."""
-    return dict(zip(machine.family.components, machine.family.component_names, strict=True))
+    return shown
 
 
 def frequency_range(answer: Vibration, points: int = CURVE_POINTS, near: int = POINTS_ABOUT_A_MODE) -> Array:
@@ -430,14 +440,15 @@ def frequency_range(answer: Vibration, points: int = CURVE_POINTS, near: int = P
         InputError: the range of the answer and the frequencies of its tool have nothing in common.
     """
     drawn = answer.modes[:DRAWN_MODES]
-    below, above = RANGE_OF_CURVES
-    ends = (answer.lowest or below * drawn[0].frequency, answer.highest or above * drawn[-1].frequency)
+    low = answer.lowest or LOWEST_OF_CURVES * drawn[0].frequency
+    high = answer.highest or HIGHEST_OF_CURVES * drawn[-1].frequency
+    of_tool = np.zeros(0)
     if answer.tool is not None:
-        ends = (max(ends[0], float(answer.tool.frequencies[0])), min(ends[1], float(answer.tool.frequencies[-1])))
-        if ends[0] >= ends[1]:
+        low, high = max(low, float(answer.tool.frequencies[0])), min(high, float(answer.tool.frequencies[-1]))
+        of_tool = answer.tool.search_frequencies
+        if low >= high:
             raise InputError("the range of the response and the frequencies of the tool have nothing in common.")
     widths = np.linspace(-REACH_ABOUT_A_MODE, REACH_ABOUT_A_MODE, near)
-    about = [mode.frequency * (1.0 + max(mode.ratio, LEAST_DRAWN_RATIO) * widths) for mode in drawn]
-    of_tool = [] if answer.tool is None else [answer.tool.search_frequencies]
-    frequencies = np.concatenate([np.geomspace(*ends, points), *about, *of_tool])
-    return np.unique(frequencies[(frequencies >= ends[0]) & (frequencies <= ends[1])])
+    about_modes = [mode.frequency * (1.0 + max(mode.ratio, LEAST_DRAWN_RATIO) * widths) for mode in drawn]
+    frequencies = np.concatenate([np.geomspace(low, high, points), *about_modes, of_tool])
+    return np.unique(frequencies[(frequencies >= low) & (frequencies <= high)])
