@@ -34,7 +34,7 @@ def test_next_poses_keep_the_limits_one_by_one(answers):
         assert response.status == Status.OK
         assert response.checks
         assert all(check.kept for check in response.checks)
-    assert "within the [limits]" in proposed.within
+    assert "within the [limits]" in proposed.area
 
 
 def test_limits_let_them_go_farther_than_what_was_measured_and_make_them_worth_more(answers):
@@ -46,8 +46,8 @@ def test_limits_let_them_go_farther_than_what_was_measured_and_make_them_worth_m
         low, high = without.ranges[path]
         assert low >= column.min()
         assert high <= column.max()
-    assert within.sharper > 1.2 * without.sharper
-    assert "sets no [limits]" in without.within
+    assert within.gain > 1.2 * without.gain
+    assert "sets no [limits]" in without.area
 
 
 def test_distances_are_measured_from_where_a_file_measures_them_also_if_few_of_its_lines_do():

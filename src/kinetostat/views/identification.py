@@ -76,12 +76,23 @@ def _fit_lines(record: FitRecord) -> Lines:
 def _lines(answer: Identification) -> Lines:
     yield from _fit_lines(_record(answer))
     if answer.next is not None:
-        sharper, random = (number(factor, digits=3) for factor in (answer.next.sharper, answer.next.random))
+        gain, gain_at_random = (number(factor, digits=3) for factor in (answer.next.gain, answer.next.gain_at_random))
         yield (
             "Next poses",
-            f"They make the intervals shorter by a factor of {sharper} on average; as many poses at random by "
-            f"{random}. {answer.next.within} Candidates: {_ranges(answer.next, answer.machine)}.",
+            f"They make the intervals shorter by a factor of {gain} on average; as many poses at random by "
+            f"{gain_at_random}. {answer.next.area} Candidates: {_ranges(answer.next, answer.machine)}.",
         )
+
+
+def _proposal(proposed: NextPoses) -> dict[str, Any]:
+    """Return proposed poses as plain data."""
+    return {
+        "poses": proposed.poses,
+        "sharper": proposed.gain,
+        "random": proposed.gain_at_random,
+        "ranges": proposed.ranges,
+        "within": proposed.area,
+    }
 
 
 def _ranges(proposed: NextPoses, machine: Machine) -> str:
@@ -240,7 +251,7 @@ IDENTIFICATION = Description(
             lambda answer: [{"line": line, "value": name, "sigmas": off} for line, name, off in answer.outliers],
         ),
         Field("unseen", lambda answer: list(answer.unseen)),
-        Field("next_poses", "next"),
+        Field("next_poses", lambda answer: None if answer.next is None else _proposal(answer.next)),
     ),
     lines=_lines,
     tables=_tables,

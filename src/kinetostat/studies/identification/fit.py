@@ -32,7 +32,7 @@ SAME_SPREAD = 0.1
 """Relative change of the spread of residuals below which it has settled."""
 UNSEEN = 1e-6
 """Strength of a combination, as a share of the strongest one, below which it is not seen: round-off is 1e-9."""
-SURELY = 1.959963984540054
+NORMAL_FACTOR = 1.959963984540054
 """Half of the 95 % interval of a normal value over its standard deviation."""
 UPPER_QUANTILE = 0.975
 """Probability below the upper end of a 95 % interval."""
@@ -324,8 +324,14 @@ def _combinations(rates: Array, options: FitOptions, spread: float) -> _SeenComb
     seen = strengths > np.maximum(UNSEEN * strengths[0], np.linalg.norm(directions @ weak, axis=1))
     order, rank = np.argsort(~seen, kind="stable"), int(seen.sum())
     unseen = np.linalg.qr(weak @ directions[order[rank:]].T)[0]
-    preference = np.concatenate([weak, FULL_PREFERENCE * unseen.T @ weak])
-    return _SeenCombinations(strengths[order], directions[order].T, rank, unit, prior, preference)
+    return _SeenCombinations(
+        strengths=strengths[order],
+        columns=directions[order].T,
+        rank=rank,
+        unit=unit,
+        prior=prior,
+        preference=np.concatenate([weak, FULL_PREFERENCE * unseen.T @ weak]),
+    )
 
 
 def _least_squares(
@@ -334,9 +340,9 @@ def _least_squares(
     """Values of the unknowns by least squares of the kept rows, or by Cauchy's loss at the scale of the spread, SI."""
     from scipy.optimize import least_squares  # half a second to import
 
-    kept, most = state.kept, options.bounds / options.sizes
+    kept, bounds = state.kept, options.bounds / options.sizes
     # One residual that never changes: a fall of the sum of squares is small beside one squared standard deviation.
-    constant, no_slope = np.array([seen.unit]), np.zeros((1, len(most)))
+    constant, no_slope = np.array([seen.unit]), np.zeros((1, len(bounds)))
 
     def residuals(units: Array) -> Array:
         measured = equations.residuals(units * options.sizes)[kept]
@@ -354,7 +360,7 @@ def _least_squares(
 
     form, scale, precision = (loss, state.spread, FIT_BEGUN) if with_loss else ("linear", 1.0, FIT_SETTLED)
     answer = least_squares(
-        residuals, state.values / options.sizes, slopes, (-most, most), loss=form, f_scale=scale,
+        residuals, state.values / options.sizes, slopes, (-bounds, bounds), loss=form, f_scale=scale,
         ftol=precision, xtol=precision, gtol=None, max_nfev=MOST_FIT_STEPS,
     )  # fmt: skip
     return np.asarray(answer.x * options.sizes)
@@ -400,24 +406,24 @@ def _freedom(rates: Array, seen: _SeenCombinations) -> float:
 def _covariance_and_interval(
     rates: Array, seen: _SeenCombinations, options: FitOptions, scatter: float, freedom: float
 ) -> tuple[Array, Array]:
-    """`Fit.covariance` and `Fit.interval` by `Fit.scatter` and `Fit.freedom` of the kept residuals and their rates."""
+    """The covariance and the interval of a `Fit` whose kept rows have these rates, scatter and freedom, SI."""
     basis = seen.columns[:, : seen.rank] / seen.strengths[: seen.rank]
     spread = 1.0 if options.known else max(scatter, options.resolution)
     units = spread**2 * np.outer(options.sizes, options.sizes)
     measured, known_before = rates @ basis, seen.prior @ basis
-    factor = SURELY if options.known else _student_factor(freedom)
-    widened = factor**2 * measured.T @ measured + SURELY**2 * known_before.T @ known_before
+    factor = NORMAL_FACTOR if options.known else _student_factor(freedom)
+    widened = factor**2 * measured.T @ measured + NORMAL_FACTOR**2 * known_before.T @ known_before
     return basis @ basis.T * units, basis @ widened @ basis.T * units
 
 
 def _half_intervals(interval: Array, seen: _SeenCombinations, options: FitOptions) -> Array:
     """Half of the 95 % interval of each unknown, with what unseen combinations of plausible size may add [unknowns]."""
-    hidden = seen.columns[:, seen.rank :]
-    likely = np.linalg.inv(hidden.T @ np.diag((FULL_PREFERENCE * options.preferred) ** 2) @ hidden)
-    unseen = np.sqrt(np.einsum("ui,ij,uj->u", hidden, likely, hidden)) * options.sizes
-    result = np.hypot(np.sqrt(np.diag(interval)), SURELY * unseen)
-    result[np.linalg.norm(hidden, axis=1) > np.sqrt(UNSEEN)] = np.inf
-    return np.asarray(result)
+    unseen = seen.columns[:, seen.rank :]
+    covariance_of_unseen = np.linalg.inv(unseen.T @ np.diag((FULL_PREFERENCE * options.preferred) ** 2) @ unseen)
+    deviations = np.sqrt(np.einsum("ui,ij,uj->u", unseen, covariance_of_unseen, unseen)) * options.sizes
+    half_intervals = np.hypot(np.sqrt(np.diag(interval)), NORMAL_FACTOR * deviations)
+    half_intervals[np.linalg.norm(unseen, axis=1) > np.sqrt(UNSEEN)] = np.inf
+    return np.asarray(half_intervals)
 
 
 def _student_factor(freedom: float) -> float:
@@ -427,15 +433,18 @@ def _student_factor(freedom: float) -> float:
     return float(stdtrit(freedom, UPPER_QUANTILE))
 
 
-def _predicted_residuals(state: _Iterate, groups: Integers, known: Array) -> Array:
-    """Residuals of each fifth of the poses, predicted from the others: the fit to these is one linear step away."""
-    result, folds = state.after.copy(), np.unique(groups, return_inverse=True)[1] % FOLDS
-    for number in range(FOLDS):
-        others, left_out = state.kept & (folds != number), folds == number
+def _predicted_residuals(state: _Iterate, groups: Integers, rows_beside_measured: Array) -> Array:
+    """Residuals of each fifth of the poses, predicted from the others: the fit to these is one linear step away.
+
+    A fifth without kept values, or without others, keeps the residuals of the fit.
+    """
+    predicted, fold_of_row = state.after.copy(), np.unique(groups, return_inverse=True)[1] % FOLDS
+    for fold in range(FOLDS):
+        others, left_out = state.kept & (fold_of_row != fold), fold_of_row == fold
         if not others.any() or not left_out.any():
             continue
-        rows = np.concatenate([state.rates[others], known])
-        residuals = np.concatenate([state.after[others], np.zeros(len(known))])
+        rows = np.concatenate([state.rates[others], rows_beside_measured])
+        residuals = np.concatenate([state.after[others], np.zeros(len(rows_beside_measured))])
         step = np.linalg.lstsq(rows, residuals, rcond=None)[0]
-        result[left_out] = state.after[left_out] - state.rates[left_out] @ step
-    return result
+        predicted[left_out] = state.after[left_out] - state.rates[left_out] @ step
+    return predicted

@@ -37,6 +37,19 @@ DOUBLED = 2.0
 """Factor on a stiffness of the file by which its springs are recognised; exact in binary."""
 DIGITS = 12
 """Digits of a fitted value: more than any measurement has, and few enough to hide the round-off of changing units."""
+PRINTER_FAMILY = "delta-linear"
+"""Family of the machines whose firmware knows the numbers of a linear delta."""
+TOWERS = "ABC"
+"""Names of the towers, in the order of the machine's legs, as firmware calls them."""
+NOMINAL_ANGLES = (210.0, 330.0, 90.0)
+"""Angles of the towers A, B, C of an ideal printer, from the x axis, degrees."""
+FIRMWARE_STEP = 1e-6
+"""Step of central differences of firmware numbers, in plausible sizes of the unknowns: a nanometre or a nanoradian,
+which leaves seven digits of the rates."""
+NUMBERS_WITH_INTERVALS = ("radius", "rods", "angles", "raised", "scale")
+"""Firmware numbers that have intervals: those that a user sets."""
+SAME_SCALE = 1e-9
+"""Difference of a scale from 1 up to which it is round-off."""
 
 
 def fitted_file_values(answer: Identification) -> dict[str, float] | None:
@@ -88,9 +101,10 @@ def _fitted_stiffnesses(machine: Machine, factors: Array) -> dict[str, float] | 
         if not path.startswith(SPRINGS) or not 0.0 < stiffness < math.inf:
             continue
         stiffer = _compliances(machine.with_values({path: DOUBLED * stiffness}))
-        its_factors = set(factors[DOUBLED * stiffer == drawn].tolist()) if stiffer.shape == drawn.shape else set()
-        if len(its_factors) == 1 and its_factors != {1.0}:
-            fitted[path] = stiffness / its_factors.pop()
+        is_of_path = DOUBLED * stiffer == drawn if stiffer.shape == drawn.shape else np.zeros(drawn.shape, dtype=bool)
+        factors_of_path = set(factors[is_of_path].tolist())
+        if len(factors_of_path) == 1 and factors_of_path != {1.0}:
+            fitted[path] = stiffness / factors_of_path.pop()
     reached, wanted = _compliances(machine.with_values(fitted)), drawn * factors
     as_wanted = reached.shape == wanted.shape and np.allclose(reached, wanted, rtol=FITTED_COMPLIANCE, atol=0.0)
     return fitted if as_wanted else None
@@ -127,18 +141,6 @@ def with_home(answer: Identification, record: dict[str, Any]) -> dict[str, Any]:
     coordinates = home_coordinates(answer.machine.with_values(fitted))
     of_file = {"actuators": coordinates, "senses": dict.fromkeys(coordinates, 1.0)}
     return {**record, "home": home | of_file, "numbers": fitted}
-
-
-PRINTER_FAMILY, TOWERS = "delta-linear", "ABC"
-NOMINAL_ANGLES = (210.0, 330.0, 90.0)
-"""Angles of the towers A, B, C of an ideal printer, from the x axis, degrees."""
-FIRMWARE_STEP = 1e-6
-"""Step of central differences of firmware numbers, in plausible sizes of the unknowns: a nanometre or a nanoradian,
-which leaves seven digits of the rates."""
-INTERVALS = ("radius", "rods", "angles", "raised", "scale")
-"""Firmware numbers that have intervals."""
-SAME_SCALE = 1e-9
-"""Difference of a scale from 1 up to which it is round-off."""
 
 
 @dataclass(frozen=True)
@@ -182,40 +184,48 @@ def firmware_numbers(answer: Identification) -> FirmwareNumbers | None:
     """The numbers of a controller that a fit gives; None of a machine that is not a linear delta."""
     if answer.machine.family.name != PRINTER_FAMILY:
         return None
-    fit, steps = answer.fit, FIRMWARE_STEP * answer.sizes
-    numbers = _numbers(answer, fit.values)
-    ends = [
-        (_numbers(answer, fit.values + step), _numbers(answer, fit.values - step), 2.0 * step.sum())
-        for step in np.diag(steps)
-    ]
+    fit = answer.fit
+    numbers = _numbers_by_name(answer, fit.values)
+    ends = []
+    for step in np.diag(FIRMWARE_STEP * answer.sizes):
+        ahead, behind = (_numbers_by_name(answer, values) for values in (fit.values + step, fit.values - step))
+        ends.append((ahead, behind, 2.0 * step.sum()))
     halves = {}
-    for name in INTERVALS:
+    for name in NUMBERS_WITH_INTERVALS:
         rates = np.stack([(ahead[name] - behind[name]) / width for ahead, behind, width in ends], axis=1)
         halves[name] = tuple(np.sqrt(np.einsum("ij,jk,ik->i", rates, fit.interval, rates)).tolist())
-    lists = {name: tuple(entries.tolist()) for name, entries in numbers.items()}
-    return FirmwareNumbers(**{**lists, "radius": lists["radius"][0], "scale": lists["scale"][0]}, halves=halves)
+    return FirmwareNumbers(
+        radius=float(numbers["radius"][0]),
+        rods=tuple(numbers["rods"].tolist()),
+        angles=tuple(numbers["angles"].tolist()),
+        raised=tuple(numbers["raised"].tolist()),
+        scale=float(numbers["scale"][0]),
+        halves=halves,
+        heights=tuple(numbers["heights"].tolist()),
+        nozzle_rises=tuple(numbers["nozzle_rises"].tolist()),
+    )
 
 
-def _numbers(answer: Identification, values: Array) -> dict[str, Array]:
+def _numbers_by_name(answer: Identification, values: Array) -> dict[str, Array]:
     """The fields of `FirmwareNumbers` but its intervals, by name, at values of the unknowns [1 or 3 each]."""
     errors = list(zip(answer.observed.model.errors, answer.observed.errors(values), strict=True))
-    by_path = {error.path: size for error, size in errors}
+    size_by_path = {error.path: size for error, size in errors}
     geometry = answer.machine.tables["geometry"]
 
     def of_towers(field: str) -> Array:
-        return np.array([by_path.get(f"geometry.{field}.{number}", 0.0) for number in range(len(TOWERS))])
+        return np.array([size_by_path.get(f"geometry.{field}.{number}", 0.0) for number in range(len(TOWERS))])
 
     def of_actuators(group: str) -> Array:
         legs = [f"tower {tower}" for tower in TOWERS]
-        return np.array([sum(s for e, s in errors if e.group == group and e.leg == leg) for leg in legs])
+        return np.array([sum(size for e, size in errors if e.group == group and e.leg == leg) for leg in legs])
 
     drawn_radius, drawn_rods = np.mean(geometry.tower_radius) - geometry.platform_radius, np.array(geometry.rod_length)
-    radius = drawn_radius + of_towers("tower_radius").mean() - by_path.get("geometry.platform_radius", 0.0)
+    radius = drawn_radius + of_towers("tower_radius").mean() - size_by_path.get("geometry.platform_radius", 0.0)
     rods = drawn_rods + of_towers("rod_length")
     angles = np.array(geometry.tower_angles) + of_towers("tower_angles") - np.radians(NOMINAL_ANGLES)
     heights = of_actuators("zeros")
     rods_lift = np.sqrt(drawn_rods**2 - drawn_radius**2) - np.sqrt(rods**2 - radius**2)
-    nozzle_rises = rods_lift - by_path.get("geometry.platform_height", 0.0)
+    nozzle_rises = rods_lift - size_by_path.get("geometry.platform_height", 0.0)
     return {
         "radius": 1e3 * np.array([radius]),
         "rods": 1e3 * rods,

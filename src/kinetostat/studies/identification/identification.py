@@ -16,12 +16,20 @@ from kinetostat.arrays import Array
 from kinetostat.display import number
 from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
+from kinetostat.machine.parameters import POSE
 from kinetostat.spec.arguments import as_list, checked
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, positive_number
 from kinetostat.studies.identification.fit import Fit, FitOptions, Tell, best_fit
 from kinetostat.studies.identification.measurements import EULER, ROTATION, Measurements, Sigmas, read_measurements
-from kinetostat.studies.identification.next_poses import MOST_PROPOSED, NextPoses, first_poses, next_poses, unit_of
+from kinetostat.studies.identification.next_poses import (
+    MOST_PROPOSED,
+    NextPoses,
+    Poses,
+    first_poses,
+    next_poses,
+    unit_of,
+)
 from kinetostat.studies.identification.observation import (
     FRAME_UNKNOWNS,
     PLACES,
@@ -30,6 +38,7 @@ from kinetostat.studies.identification.observation import (
     observation,
     place_unknown,
 )
+from kinetostat.studies.identification.record import Outlier
 from kinetostat.studies.identification.unseen import Unseen, unseen_of
 from kinetostat.tolerances import ROUND_OFF_OF_MEASUREMENT
 from kinetostat.units import KINDS, UnitError, parse
@@ -89,16 +98,16 @@ class Identification:
         return self.observed.errors(self.fit.values)
 
     @property
-    def outliers(self) -> list[tuple[int, str, float]]:
-        """Values that were set aside: line of the file, name, and residual in standard deviations."""
-        data, fit = self.observed.data, self.fit
+    def outliers(self) -> list[Outlier]:
+        """Values that were set aside."""
+        lines, observed = self.observed.data.lines, self.observed
         return [
-            (data.lines[self.observed.row_poses[row]], self.observed.row_names[row], float(fit.after[row]))
-            for row in np.flatnonzero(~fit.kept)
+            Outlier(lines[observed.row_poses[row]], observed.row_names[row], float(self.fit.after[row]))
+            for row in np.flatnonzero(~self.fit.kept)
         ]
 
     def scatter(self, residuals: Array) -> dict[str, float]:
-        """Root mean square of kept residuals, of positions and distances (m) and of angles (rad).
+        """Root mean square of kept residuals, times their standard deviations: "length" in m, "angle" in rad.
 
         Args:
             residuals: residuals in standard deviations, of all rows [rows].
@@ -147,42 +156,54 @@ def identify(
     """
     if not 0 <= more <= MOST_PROPOSED:
         raise InputError(f"more (--next) is {more}; give a whole number of poses from 0 to {MOST_PROPOSED}.")
-    sigmas = Sigmas(
-        positive_number(sigma, "length", "sigma") if sigma else USUAL_SIGMA,
-        positive_number(sigma_angle, "angle", "sigma_angle") if sigma_angle else 0.0,
-        bool(sigma or sigma_angle),
-    )
-    if not sigmas.angle:
-        length = float((machine.chains() if machine.family.chains else machine.configure()).length)
-        sigmas = Sigmas(sigmas.length, sigmas.length / length, sigmas.known)
+    sigma_length = positive_number(sigma, "length", "sigma") if sigma else USUAL_SIGMA
+    if sigma_angle:
+        sigma_turn = positive_number(sigma_angle, "angle", "sigma_angle")
+    else:  # the turn that moves a point at the machine's length by as much
+        sigma_turn = sigma_length / float((machine.chains() if machine.family.chains else machine.configure()).length)
+    sigmas = Sigmas(length=sigma_length, angle=sigma_turn, known=bool(sigma or sigma_angle))
     measured = read_measurements(machine, Path(data), sigmas)
     model = error_model(machine, measured.pose, len(measured), np.zeros(6))
-    return identification_of(model, measured, fit, frame, target, priors or {}, bounds or {}, robust, more, tell, ties)
+    return identification_of(
+        model,
+        measured,
+        fit,
+        frame=frame,
+        target=target,
+        priors=priors,
+        bounds=bounds,
+        robust=robust,
+        more=more,
+        ties=ties,
+        tell=tell,
+    )
 
 
 def identification_of(
     model: ErrorModel,
     data: Measurements,
     fit: Sequence[str] = USUALLY_FITTED,
+    *,
     frame: bool = False,
     target: bool = False,
     priors: Mapping[str, str] | None = None,
     bounds: Mapping[str, str] | None = None,
     robust: bool = True,
     more: int = 0,
-    tell: Tell = lambda *_: None,
     ties: Mapping[str, str] | None = None,
+    tell: Tell = lambda *_: None,
 ) -> Identification:
     """Find errors from measurements that are numbers already; arguments and errors as for `identify`.
 
     Args:
         model: the errors of the machine at the commanded poses.
         data: what was measured there.
-        fit, frame, target, priors, bounds, robust, more, tell, ties: see `identify`.
+        fit, frame, target, priors, bounds, robust, more, ties, tell: see `identify`.
 
     Raises:
         InputError: as for `identify`.
     """
+    # Ties alone are enough; without them, an empty `fit` is refused.
     unknowns = _errors_named(model, fit) if as_list(fit) or not ties else []
     tied = {name: _tied_error(model, name, terms) for name, terms in (ties or {}).items()}
     unknowns += [unknown for unknown, _ in tied.values()]
@@ -251,10 +272,10 @@ def _tied_error(model: ErrorModel, name: str, terms: str) -> tuple[MachineError,
     shares: dict[str, float] = {}
     named: list[MachineError] = []
     for term in terms.split("+"):
-        factor, star, pattern = term.partition(" * ")
-        pattern = (pattern if star else term).strip()
+        factor, has_factor, pattern = term.partition(" * ")
+        pattern = (pattern if has_factor else term).strip()
         try:
-            share = float(factor) if star else 1.0
+            share = float(factor) if has_factor else 1.0
         except ValueError:
             raise InputError(f'in the tie {name}, {shorten(factor)} is not a number; write "0.5 * PATH".') from None
         fitting_errors = [error for error in model.errors if _matches(error, pattern)]
@@ -285,22 +306,29 @@ def _matches(error: MachineError, pattern: str) -> bool:
 
 
 def _check_count(machine: Machine, observed: Observation, sizes: Array, priors: int) -> None:
-    """Refuse fewer measured values than unknowns without a prior; say how many poses are needed, and which."""
+    """Refuse fewer measured values than unknowns without a prior; say how many poses are needed, and which.
+
+    `priors` is the number of unknowns with a prior.
+    """
     data, unknowns = observed.data, len(observed.unknowns) - priors
     if data.count >= unknowns:
         return
-    values_of_a_pose = max(data.count / max(len(data), 1), 1.0)
-    needed = int(np.ceil(unknowns / values_of_a_pose))
-    poses = first_poses(machine, observed, sizes, min(needed - len(data), MOST_NAMED_POSES))
-    scales = [machine.display.scale(unit_of(machine, path)) for path in poses]
-    heads = ", ".join(scale.label(path.removeprefix("pose.")) for scale, path in zip(scales, poses, strict=True))
-    rows = np.column_stack([scale.factor * values for scale, values in zip(scales, poses.values(), strict=True)])
-    named = "; ".join(", ".join(number(value, digits=3) for value in row) for row in rows.tolist())
+    values_per_pose = max(data.count / max(len(data), 1), 1.0)
+    least_poses = int(np.ceil(unknowns / values_per_pose))
+    poses = first_poses(machine, observed, sizes, min(least_poses - len(data), MOST_NAMED_POSES))
     raise InputError(
         f'"{data.path}": {len(data)} poses give {data.count} measured values for {unknowns} unknowns; measure at '
-        f"least {needed} poses like these (better {2 * needed}), spread over the workspace and its angles, or fit less "
-        f"(--fit). Those to add first, {heads}: {named}."
+        f"least {least_poses} poses like these (better {2 * least_poses}), spread over the workspace and its angles, "
+        f"or fit less (--fit). Those to add first, {_poses_in_words(machine, poses)}."
     )
+
+
+def _poses_in_words(machine: Machine, poses: Poses) -> str:
+    """Write poses as a head of coordinates with their units, and the numbers of each pose after it."""
+    scales = [machine.display.scale(unit_of(machine, path)) for path in poses]
+    heads = ", ".join(scale.label(path.removeprefix(POSE)) for scale, path in zip(scales, poses, strict=True))
+    rows = np.column_stack([scale.factor * values for scale, values in zip(scales, poses.values(), strict=True)])
+    return f"{heads}: {'; '.join(', '.join(number(value, digits=3) for value in row) for row in rows.tolist())}"
 
 
 def _sizes_by_name(unknowns: Sequence[MachineError], texts: Mapping[str, str], subject: str) -> Array:

@@ -23,6 +23,7 @@ from kinetostat.kinematics.status import REGULAR, Status
 from kinetostat.machine.limits import limits_set
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, find_field
+from kinetostat.spec.renamed import former_names
 from kinetostat.studies.identification.fit import Fit
 from kinetostat.studies.identification.measurements import Measurements
 from kinetostat.studies.identification.observation import Observation, observation
@@ -38,12 +39,12 @@ MOST_EXCHANGES = 5
 LEAST_INFORMATION = 1e-9
 """Information along every combination, as a share of all that is known: a determinant needs some of it in each, and up
 to here it does not change the choice."""
-LEAST_SPAN = 0.1
-"""Least span of first poses on either side of the measured ones: a tenth of the machine's length, or 0.1 rad. All
-poses that were measured may be the same in some coordinate."""
+LEAST_HALF_RANGE = 0.1
+"""Least half of the range of first poses in each coordinate: a tenth of the machine's length, or 0.1 rad. All poses
+that were measured may be the same in some coordinate; twice as much would leave the workspace of many machines."""
 LONGEST_RAY = 1.5
-"""End of a ray: in lengths of the machine or rad while it is not known how far each coordinate goes, then in multiples
-of what is; the corner of a box lies beyond the middles of its faces."""
+"""End of a ray, in lengths of the machine or rad; once the extent of each coordinate is known, in multiples of it. More
+than 1, because the corner of a box lies beyond the middles of its faces."""
 RAY_STEPS = 48
 """Places of a ray at which limits are compared: half as many would give away 2 % of the gain of a hexapod."""
 SINGULAR_SHARE = 0.1
@@ -63,23 +64,24 @@ Poses = Mapping[str, Array]
 """Coordinates of poses by leaf path, SI [poses each]."""
 
 
+@former_names(sharper="gain", random="gain_at_random", within="area")
 @dataclass(frozen=True)
 class NextPoses:
     """Poses that should be measured next.
 
     Attributes:
         poses: their coordinates by leaf path, SI [k each].
-        sharper: by which factor they make the intervals of the unknowns shorter, as a geometric mean.
-        random: the same factor for as many candidates at random.
+        gain: by which factor they make the intervals of the unknowns shorter, as a geometric mean.
+        gain_at_random: the same factor for as many candidates at random.
         ranges: least and greatest value of each coordinate among the candidates, SI.
-        within: a sentence on where candidates were looked for.
+        area: a sentence on where candidates were looked for.
     """
 
     poses: Poses
-    sharper: float
-    random: float
+    gain: float
+    gain_at_random: float
     ranges: Mapping[str, tuple[float, float]]
-    within: str
+    area: str
 
 
 def next_poses(machine: Machine, observed: Observation, fit: Fit, sizes: Array, count: int) -> NextPoses | None:
@@ -92,7 +94,7 @@ def next_poses(machine: Machine, observed: Observation, fit: Fit, sizes: Array, 
         sizes: plausible size of each unknown, SI [unknowns].
         count: how many poses are wanted.
     """
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(0)  # a fixed seed: the same measurements give the same advice
     candidates, area = _candidates(machine, observed, _ranges(observed.data.pose), rng)
     if len(candidates.data) < count:
         return None
@@ -104,10 +106,10 @@ def next_poses(machine: Machine, observed: Observation, fit: Fit, sizes: Array, 
     random_poses = rng.permutation(len(blocks))[:count]
     return NextPoses(
         poses=_selection(candidates, chosen),
-        sharper=_gain(blocks[chosen], information),
-        random=_gain(blocks[random_poses], information),
+        gain=_gain(blocks[chosen], information),
+        gain_at_random=_gain(blocks[random_poses], information),
         ranges=_ranges(candidates.data.pose),
-        within=area,
+        area=area,
     )
 
 
@@ -120,12 +122,12 @@ def first_poses(machine: Machine, observed: Observation, sizes: Array, count: in
         sizes: plausible size of each unknown, SI [unknowns].
         count: how many poses are wanted; fewer are chosen where fewer candidates can be placed.
     """
-    spans = {}
+    ranges = {}
     for path, (low, high) in _ranges(observed.data.pose).items():
         middle, half = 0.5 * (high + low), 0.5 * (high - low)
-        half = max(half, LEAST_SPAN * _scale(machine, path, observed.model.length))
-        spans[path] = (middle - half, middle + half)
-    candidates, _ = _candidates(machine, observed, spans, np.random.default_rng(0))
+        half = max(half, LEAST_HALF_RANGE * _scale(machine, path, observed.model.length))
+        ranges[path] = (middle - half, middle + half)
+    candidates, _ = _candidates(machine, observed, ranges, np.random.default_rng(0))
     drawn = np.zeros(len(sizes))
     _, measured_rates = observed.linearisation(drawn)
     _, rates = candidates.linearisation(drawn)
@@ -161,18 +163,19 @@ def _selection(candidates: Observation, numbers: Sequence[int]) -> Poses:
 
 
 def _candidates(
-    machine: Machine, observed: Observation, spans: Mapping[str, tuple[float, float]], rng: np.random.Generator
+    machine: Machine, observed: Observation, ranges: Mapping[str, tuple[float, float]], rng: np.random.Generator
 ) -> tuple[Observation, str]:
     """Random poses that the machine reaches, as if the same had been measured there, and a sentence on where they are.
 
-    They keep the limits of its file; where that sets none, or no measured pose keeps them, they lie within spans.
+    They keep the limits of its file; where that sets none, or no measured pose keeps them, they lie within the ranges
+    of the coordinates, and limits do not count.
     """
-    scales = {path: _scale(machine, path, observed.model.length) for path in spans}
+    scales = {path: _scale(machine, path, observed.model.length) for path in ranges}
     poses = within_limits(machine, observed.data.pose, scales, CANDIDATES, rng)
     area = WITHIN_LIMITS
     allowed: tuple[Status, ...] = (Status.OK,)
     if poses is None:
-        poses = {path: rng.uniform(low, high, CANDIDATES) for path, (low, high) in spans.items()}
+        poses = {path: rng.uniform(low, high, CANDIDATES) for path, (low, high) in ranges.items()}
         area, allowed = (BEYOND_LIMITS if limits_set(machine.tables["limits"]) else WITHOUT_LIMITS), REGULAR
     model = error_model(machine, poses, CANDIDATES, np.zeros(6))
     placed = np.flatnonzero(np.isin(model.drawn.status, allowed))
@@ -183,8 +186,8 @@ def _candidates(
 
 
 def _alike(data: Measurements, pose: Poses, count: int) -> Measurements:
-    """Measurements of the same quantities at other poses, with typical deviations, load and origin; values are zero."""
-    loads = data.wrenches[np.flatnonzero(data.wrenches.any(axis=1))[:1]]
+    """Measurements of the same quantities at other poses: median deviations and origin, the first load, values zero."""
+    wrenches = data.wrenches[data.wrenches.any(axis=1)]
     written = data.origins[np.isfinite(data.origins).all(axis=1)]  # a file without distances has none
     origin = np.median(written, axis=0) if len(written) else np.zeros(3)
     return replace(
@@ -193,7 +196,7 @@ def _alike(data: Measurements, pose: Poses, count: int) -> Measurements:
         pose=pose,
         values={name: np.zeros(count) for name in data.values},
         sigma={name: np.full(count, float(np.median(sigma))) for name, sigma in data.sigma.items()},
-        wrenches=np.broadcast_to(loads[0] if len(loads) else np.zeros(6), (count, 6)),
+        wrenches=np.broadcast_to(wrenches[0] if len(wrenches) else np.zeros(6), (count, 6)),
         origins=np.broadcast_to(origin, (count, 3)),
     )
 
@@ -262,23 +265,28 @@ def within_limits(
     margins = _margins(machine, paths, places)
     if not (margins > 0.0).any():
         return None
+    # Rays go out from the measured pose in the middle of those that keep the limits.
     distance_from_mean = np.abs((places - places.mean(axis=0)) / scale).max(axis=1)
     middle = int(np.argmin(np.where(margins > 0.0, distance_from_mean, np.inf)))
-    start, least = places[middle], SINGULAR_SHARE * float(margins[middle])
+    start, least_margin = places[middle], SINGULAR_SHARE * float(margins[middle])
     axes = np.concatenate([np.diag(scale), -np.diag(scale)])
-    reach = _reach(machine, paths, start, axes, least).reshape(2, -1).max(axis=0) * scale
+    extents = _reach(machine, paths, start, axes, least_margin).reshape(2, -1).max(axis=0) * scale
     rays = rng.normal(size=(count, len(paths)))
-    rays = rays / np.linalg.norm(rays, axis=1)[:, None] * reach
+    rays = rays / np.linalg.norm(rays, axis=1)[:, None] * extents
     # The root makes poses even in the volume: as many lie in each part of it.
-    share = _reach(machine, paths, start, rays, least) * rng.random(count) ** (1.0 / len(paths))
-    return dict(zip(paths, (start + share[:, None] * rays).T, strict=True))
+    factors = _reach(machine, paths, start, rays, least_margin) * rng.random(count) ** (1.0 / len(paths))
+    return dict(zip(paths, (start + factors[:, None] * rays).T, strict=True))
 
 
-def _reach(machine: Machine, paths: list[str], start: Array, rays: Array, least: float) -> Array:
-    """The factor of each ray [rays x coordinates] up to which the margin along it stays above the least one [rays]."""
+def _reach(machine: Machine, paths: list[str], start: Array, rays: Array, least_margin: float) -> Array:
+    """The factor of each ray [rays x coordinates] up to which the singularity margin along it is above the least one.
+
+    Returns:
+        The factors [rays], from 0 to `LONGEST_RAY`.
+    """
     factors = np.linspace(0.0, LONGEST_RAY, RAY_STEPS + 1)
     places = start + factors[1:, None, None] * rays
-    passes = _margins(machine, paths, places.reshape(-1, len(paths))).reshape(RAY_STEPS, -1) > least
+    passes = _margins(machine, paths, places.reshape(-1, len(paths))).reshape(RAY_STEPS, -1) > least_margin
     steps_passed = np.where(passes.all(axis=0), RAY_STEPS, np.argmin(passes, axis=0))
     return np.asarray(factors[steps_passed])
 

@@ -6,7 +6,7 @@ Nothing is fitted here, and nothing of the file is trusted before its form has b
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,13 +16,15 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 
 RECORD = "fit.json"
+"""Name of the file of a record, in the folder that `kinetostat identify -o` writes."""
 FIT_PICTURES = ("residuals", "correlations", "poses")
 """Names of the pictures beside a record, without their suffix."""
 PNG = b"\x89PNG\r\n\x1a\n"
 """The bytes with which a PNG file begins."""
 LARGEST_RECORD = 1 << 28
 """Bytes that are read of a record or a picture: a covariance of a thousand unknowns takes a tenth of them."""
-FIT_ADVICE = "give the folder, or the fit.json in it, that `kinetostat identify -o FOLDER` has written."
+FIT_ADVICE = f"give the folder, or the {RECORD} in it, that `kinetostat identify -o FOLDER` has written."
+"""End of the messages about something that is not a record."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,31 @@ class FittedNumber:
     half: float
 
 
+class Outlier(NamedTuple):
+    """A measured value that a fit has set aside.
+
+    Attributes:
+        line: line of the file of measurements.
+        name: name of the value, "x" or "deflection.z".
+        sigmas: its residual in standard deviations.
+    """
+
+    line: int
+    name: str
+    sigmas: float
+
+
+class RecordedUnseen(NamedTuple):
+    """A combination of unknowns that a fit has not seen: its sentence, and its motion of the tool, m.
+
+    `inside` is the part of the motion that other places of base and target do not undo.
+    """
+
+    words: str
+    tool: float
+    inside: float
+
+
 @dataclass(frozen=True)
 class FitRecord:
     """The record of a fit, read from its file.
@@ -59,8 +86,8 @@ class FitRecord:
         scatter: standard deviation of the residuals over the expected one.
         known: whether the standard deviations of the measurements were known.
         residuals: root mean squares of lengths (m) and angles (rad): as drawn, as identified, and of poses left out.
-        outliers: of each outlier the line of the file, its name, and its residual in standard deviations.
-        unseen: of each unseen combination a sentence, and its motion of the tool, in all and inside the machine, m.
+        outliers: values that were set aside.
+        unseen: combinations of unknowns that are not seen.
         pictures: PNG files by name, as far as they lie beside the record.
         home: where actuators stand at the home pose of the machine as built, by name, counted as in the drawn machine,
             m or rad; none in a record without a machine file.
@@ -80,8 +107,8 @@ class FitRecord:
     scatter: float
     known: bool
     residuals: tuple[Mapping[str, float], ...]
-    outliers: tuple[tuple[int, str, float], ...]
-    unseen: tuple[tuple[str, float, float], ...]
+    outliers: tuple[Outlier, ...]
+    unseen: tuple[RecordedUnseen, ...]
     pictures: Mapping[str, bytes]
     home: Mapping[str, float]
     senses: Mapping[str, float]
@@ -104,20 +131,22 @@ class FitRecord:
         from_home = np.asarray(coordinates, dtype=float) - [home[name] for name in actuators]
         counts = from_home * [self.senses.get(name, 1.0) for name in actuators]
         counts += [self.home.get(name, home[name]) for name in actuators]
-        for wanted in ("zero", "gain"):  # zeros are added last, so they are taken off first
-            for unknown in self.unknowns:
-                path, _, kind = unknown.path.removeprefix("legs.").rpartition(".")
-                if kind != wanted or unknown.group not in ("zeros", "gains"):
-                    continue
-                name = path.replace(".", " ")
+        zeros, gains = self._by_actuator("zeros", actuators), self._by_actuator("gains", actuators)
+        return np.asarray((counts - zeros) / (1.0 + gains))
+
+    def _by_actuator(self, group: str, actuators: Sequence[str]) -> Array:
+        """The values of a group of unknowns, "zeros" or "gains", by actuator; 0 for those that were not fitted."""
+        values = np.zeros(len(actuators))
+        for unknown in self.unknowns:
+            if unknown.group == group:
+                name = unknown.path.removeprefix("legs.").rpartition(".")[0].replace(".", " ")
                 if name not in actuators:
                     raise InputError(
                         f'"{self.path}" is about an actuator {name}, which this machine does not have; give the '
                         "machine.toml that the same fit has written."
                     )
-                column = counts[:, list(actuators).index(name)]
-                column[:] = column - unknown.value if kind == "zero" else column / (1.0 + unknown.value)
-        return counts
+                values[list(actuators).index(name)] = unknown.value
+        return values
 
     def check(self, machine: Machine, drawn: bool = True) -> None:
         """Refuse a machine that was not fitted.
@@ -215,8 +244,12 @@ def record_of(path: str, record: Any, pictures: Mapping[str, bytes]) -> FitRecor
             {str(kind): float(size) for kind, size in record.get(name, {}).items()}
             for name in ("before", "after", "left_out")
         ),
-        outliers=tuple((int(o["line"]), str(o["value"]), float(o["sigmas"])) for o in record.get("outliers", [])),
-        unseen=tuple((str(u["words"]), float(u["tool"]), float(u["inside"])) for u in record.get("unseen", [])),
+        outliers=tuple(
+            Outlier(int(o["line"]), str(o["value"]), float(o["sigmas"])) for o in record.get("outliers", [])
+        ),
+        unseen=tuple(
+            RecordedUnseen(str(u["words"]), float(u["tool"]), float(u["inside"])) for u in record.get("unseen", [])
+        ),
         pictures={name: data for name, data in pictures.items() if data.startswith(PNG)},
         home=_numbers(record.get("home", {}).get("actuators", {})),
         senses=_numbers(record.get("home", {}).get("senses", {})),
