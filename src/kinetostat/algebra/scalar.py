@@ -7,6 +7,7 @@ products and sums while the formula is traced, so that sparse screws cost what t
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 Scalar: TypeAlias = Any
@@ -45,6 +46,11 @@ def total(terms: list[Scalar]) -> Scalar:
     for term in terms:
         result = result + term
     return result
+
+
+def inner_product(left: Sequence[Scalar], right: Sequence[Scalar]) -> Scalar:
+    """Sum of the products of two rows of equal length, entry by entry, left to right."""
+    return total([a * b for a, b in zip(left, right, strict=True)])
 
 
 def sqrt(a: Scalar) -> Scalar:

@@ -9,7 +9,18 @@ Source: theory (1), (6), (7) and (9); G. H. Golub and C. F. Van Loan, Matrix Com
 import math
 from collections.abc import Sequence
 
-from kinetostat.algebra.scalar import Scalar, is_zero, larger, reciprocal, smaller, sqrt, total, weighted, where
+from kinetostat.algebra.scalar import (
+    Scalar,
+    inner_product,
+    is_zero,
+    larger,
+    reciprocal,
+    smaller,
+    sqrt,
+    total,
+    weighted,
+    where,
+)
 from kinetostat.frozen import dataclass
 from kinetostat.tolerances import CLOSING_ROUND_OFF, SURE_PIVOT, SURELY_MORE, UNRESISTED, ZERO_PIVOT
 
@@ -40,7 +51,7 @@ class _Triangular:
 
     def column(self, row: int) -> Row:
         """The column of Q of one row: in reverse, the first reflections meet most zeros."""
-        result = _identity(len(self.vectors[0]))[row]
+        result = identity(len(self.vectors[0]))[row]
         for reflection in reversed(self.reflections):
             reflection.apply(result)
         return result
@@ -218,7 +229,8 @@ def _reflection(column: Row, rows: list[int]) -> _Reflection:
     return _Reflection(rows, normal, weight, weight * -normal[0])  # one division for both
 
 
-def _identity(size: int) -> list[Row]:
+def identity(size: int) -> list[Row]:
+    """The rows of a unit matrix."""
     return [[1.0 if i == j else 0.0 for i in range(size)] for j in range(size)]
 
 
@@ -350,7 +362,7 @@ class Eliminated:
         """L^-1 b."""
         result: Row = []
         for row, value in zip(self.lower, right, strict=True):
-            result.append(value - total([a * b for a, b in zip(row, result, strict=True)]))
+            result.append(value - inner_product(row, result))
         return result
 
     def solve(self, right: Sequence[Scalar]) -> Row:

@@ -192,7 +192,7 @@ class ObjectRelocation(NamedTuple):
 
     @property
     def kind(self) -> int:
-        """How the distance is written."""
+        """Kind of the relocation: the form in which the distance is written."""
         return self.symbol_and_kind & 0xFFFFFFFF
 
 

@@ -84,18 +84,18 @@ class Hanging:
     @property
     def spans(self) -> tuple[Array, Array]:
         """Horizontal distance of both ends, and height of the base end above the other, m."""
-        compliance = self.length / self.rigidity
-        level = self.across * (compliance + self._slope_change)
-        return level, 0.5 * self._sum_of_ups * compliance + self.length * self._mean_sine
+        stretching = self.length / self.rigidity
+        distance = self.across * (stretching + self._slope_change)
+        return distance, 0.5 * self._sum_of_ups * stretching + self.length * self._mean_sine
 
     @property
     def _sum_of_ups(self) -> Array:
-        """Sum of the vertical parts of both end tensions, N."""
+        """Sum of the upward parts of the tension at both ends, N."""
         return 2.0 * self.up + self.weight * self.length
 
     @property
     def _mean_sine(self) -> Array:
-        """Sum of the vertical parts of both end tensions over the sum of these: a sine between those of both slopes."""
+        """Sum of the upward parts of both end tensions over the sum of these tensions: a sine between both end's."""
         return self._sum_of_ups / (self.tension + self.base_tension)
 
     @property
@@ -126,27 +126,27 @@ class Hanging:
     @property
     def stiffness_share(self) -> Array:
         """Share of the stiffness EA/L of a straight cable that it has along the line of its ends."""
-        level, rise = self.spans
-        chord = np.stack([level, rise], axis=-1) / np.hypot(level, rise)[..., None]
+        distance, rise = self.spans
+        chord = np.stack([distance, rise], axis=-1) / np.hypot(distance, rise)[..., None]
         along = np.einsum("nma,nmab,nmb->nm", chord, self.stiffness, chord)
         return np.asarray(along * self.length / self.rigidity)
 
     @property
     def sag(self) -> Array:
         """Greatest distance of the cable from the line of its ends, m."""
-        level, rise = self.spans
-        # The farthest point is where the cable runs along that line: up + w s = across * rise / level.
-        up_there = self.across * rise / np.maximum(level, LEAST_DIVISOR)
+        distance, rise = self.spans
+        # The farthest point is where the cable runs along that line: up + w s = across * rise / distance.
+        up_there = self.across * rise / np.maximum(distance, LEAST_DIVISOR)
         part = np.clip((up_there - self.up) / self.weight, 0.0, self.length)
         x, z = replace(self, length=part).spans
-        return np.abs(z * level - x * rise) / np.hypot(level, rise)
+        return np.abs(z * distance - x * rise) / np.hypot(distance, rise)
 
 
-def hanging_cables(level: Array, rise: Array, tension: Array, weight: Array, rigidity: Array) -> Hanging:
+def hanging_cables(distance: Array, rise: Array, tension: Array, weight: Array, rigidity: Array) -> Hanging:
     """Find the cables that hang between two points with given tensions at the platform [n x cables each].
 
     Args:
-        level, rise: horizontal distance of the points, and height of the base end above the other, m.
+        distance, rise: horizontal distance of the points, and height of the base end above the other, m.
         tension: tension at the platform end, N.
         weight: weight per metre of unstretched cable, N/m; greater than 0.
         rigidity: EA, N.
@@ -154,24 +154,24 @@ def hanging_cables(level: Array, rise: Array, tension: Array, weight: Array, rig
     Returns:
         The cables; NaN where none hangs so.
     """
-    level = np.maximum(level, HANGING * np.abs(rise))  # a cable that hangs straight down, but for round-off
-    slope, length = np.arctan2(rise, level), np.hypot(level, rise) / (1.0 + tension / rigidity)
+    distance = np.maximum(distance, HANGING * np.abs(rise))  # a cable that hangs straight down, but for round-off
+    chord = np.hypot(distance, rise)
+    slope, length = np.arctan2(rise, distance), chord / (1.0 + tension / rigidity)
     with np.errstate(all="ignore"):
         for _ in range(MOST_NEWTON_STEPS):
             across, up = tension * np.cos(slope), tension * np.sin(slope)
             cable = Hanging(across, up, weight, rigidity, length)
-            missing = np.stack([level, rise], axis=-1) - np.stack(cable.spans, axis=-1)
+            missing = np.stack([distance, rise], axis=-1) - np.stack(cable.spans, axis=-1)
             by_slope = np.einsum("nmab,nmb->nma", cable.compliance, np.stack([-up, across], axis=-1))
-            direction = cable.base_slope
-            unit = np.stack([np.cos(direction), np.sin(direction)], axis=-1)
-            by_length = unit * (1.0 + cable.base_tension / rigidity)[..., None]
+            base_direction = np.stack([np.cos(cable.base_slope), np.sin(cable.base_slope)], axis=-1)
+            by_length = base_direction * (1.0 + cable.base_tension / rigidity)[..., None]
             rates = np.stack([by_slope, by_length], axis=-1)
             regular = np.abs(np.linalg.det(rates)) > 0.0
             step = np.linalg.solve(np.where(regular[..., None, None], rates, np.eye(2)), missing[..., None])[..., 0]
             slope, length = slope + step[..., 0], np.abs(length + step[..., 1])
-            if not (np.abs(step).max(axis=-1) > HANGING * np.hypot(level, rise)).any():
+            if not (np.abs(step).max(axis=-1) > HANGING * chord).any():
                 break
-    converged = np.abs(step).max(axis=-1) <= SURELY_HANGING * np.hypot(level, rise)
+    converged = np.abs(step).max(axis=-1) <= SURELY_HANGING * chord
     length = np.where(converged, length, np.nan)
     return Hanging(tension * np.cos(slope), tension * np.sin(slope), weight, rigidity, length)
 
@@ -212,6 +212,7 @@ def cable_signs(machine: Machine) -> tuple[float, ...]:
 
 
 def _rods(chains: Chains, planar: bool) -> list[Rod | None]:
+    """Return the straight part of each leg at the home pose; None for a leg that has none."""
     legs = (Leg("", tuple(step.element for step in steps)) for steps in chains.legs)
     return [next(iter(rods([leg], planar)), None) for leg in legs]
 
@@ -311,12 +312,12 @@ def cables_of(machine: Machine, signs: tuple[float, ...], count: int) -> Cables:
 
 
 def _straight_cables(machine: Machine, signs: tuple[float, ...], count: int) -> Cables:
-    """The cables of a machine as straight lines, whatever their weight; arguments as of `cables_of`."""
+    """Return the cables of a machine as straight lines, whatever their weight; arguments as of `cables_of`."""
     chains, planar = machine.chains(), machine.family.planar
     table, load = machine.tables["cables"], machine.tables["load"]
     platform = platform_placement(chains)
     motion, tool = platform @ chains.home.inverse(), machine.tool_point(platform)
-    lines = [rod for rod in _rods(chains, planar) if rod is not None]
+    lines = [rod for rod in _rods(chains, planar) if rod is not None]  # of cables, no leg lacks one
     near, far = (
         np.stack([of_scalars(point.components(), count) for point in points], axis=1)
         for points in ([rod.start for rod in lines], [motion.apply(rod.end) for rod in lines])
@@ -348,15 +349,16 @@ def _straight_cables(machine: Machine, signs: tuple[float, ...], count: int) -> 
 
 
 def _units(vectors: Array) -> Array:
+    """Return the directions of vectors [... x 3]; a vector of zeros stays as it is."""
     sizes = np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True))
     return np.asarray(vectors / np.where(sizes > 0.0, sizes, 1.0))
 
 
 def _hanging_cables(cables: Cables, up: Array, weight: Array, radius: Array) -> Cables:
-    """Cables as they hang, and run over their pulleys, with the tensions that they have in these places.
+    """Return cables as they hang, and run over their pulleys, with the tensions that they have in these places.
 
     Tensions are chosen with the directions of the last step, and new directions follow from them, until nothing
-    changes. Poses at which that does not end have directions and lengths of NaN.
+    changes. Where that does not end within `MOST_TENSION_STEPS`, directions and lengths are NaN.
 
     Args:
         cables: the cables, straight and without pulleys.
@@ -371,24 +373,25 @@ def _hanging_cables(cables: Cables, up: Array, weight: Array, radius: Array) -> 
         changes_by_pose = np.nan_to_num(changes).max(axis=(0, 2, 3))
         if changes_by_pose.max() < SETTLED_CABLE:
             break
-    unknown = np.where(changes_by_pose < SURELY_SETTLED_CABLE, 0.0, np.nan)
-    shape = None if hung.shape is None else replace(hung.shape, length=hung.shape.length + unknown[:, None])
-    return replace(hung, directions=hung.directions + unknown[:, None, None], shape=shape)
+    zero_or_nan = np.where(changes_by_pose < SURELY_SETTLED_CABLE, 0.0, np.nan)
+    shape = None if hung.shape is None else replace(hung.shape, length=hung.shape.length + zero_or_nan[:, None])
+    return replace(hung, directions=hung.directions + zero_or_nan[:, None, None], shape=shape)
 
 
 def _cables_with_tensions_of(hung: Cables, cables: Cables, up: Array, weight: Array, radius: Array) -> Cables:
-    """Cables as they hang with the tensions of `hung`; the other arguments as for `_hanging_cables`."""
+    """Return cables as they hang with the tensions of `hung`; the other arguments as for `_hanging_cables`."""
     heavy = weight > 0.0
     span = hung.near - hung.far
     rise = np.einsum("nmk,nk->nm", span, up)
     sideways = span - rise[:, :, None] * up[:, None]
-    level = np.sqrt((sideways * sideways).sum(axis=2))
+    distance = np.sqrt((sideways * sideways).sum(axis=2))
     tensions = np.where(np.isnan(hung.tensions[0]), np.inf, hung.tensions[0])
     sags = np.isfinite(tensions) & heavy[:, None] & (tensions > 0.0)
     rigidity = cables.stiffness * np.sqrt(((cables.near - cables.far) ** 2).sum(axis=2))
-    weights = np.broadcast_to(np.where(heavy, weight, 1.0)[:, None], level.shape)  # 1 N/m of those that hang straight
-    shape = hanging_cables(level, rise, np.where(sags, tensions, 1.0), weights, rigidity)
-    straight = np.arctan2(rise, level)
+    # Cables without a weight or without a tension are straight: their shape, by 1 N/m and 1 N, is not read.
+    weights = np.broadcast_to(np.where(heavy, weight, 1.0)[:, None], distance.shape)
+    shape = hanging_cables(distance, rise, np.where(sags, tensions, 1.0), weights, rigidity)
+    straight = np.arctan2(rise, distance)
     slope = np.where(sags, np.arctan2(shape.up, shape.across), straight)
     directions = np.cos(slope)[:, :, None] * _units(sideways) + np.sin(slope)[:, :, None] * up[:, None]
     near, wound = cables.near, cables.wound

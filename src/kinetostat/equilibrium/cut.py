@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
+from kinetostat.algebra.scalar import Scalar, inner_product, is_zero, sqrt, total, where
 from kinetostat.algebra.solve import Row
 from kinetostat.algebra.symmetric import POSITIONS
 from kinetostat.algebra.vector import ZERO, Vector
@@ -350,7 +350,7 @@ def loads_of_rods(
     """
     loads = []
     for rod, pull in zip(rods, pulls, strict=True):
-        along = total([a * b for a, b in zip(pull.line, twist, strict=True)])
+        along = inner_product(pull.line, twist)
         tension = pull.tension + pull.elastic_weight * pull.length * along
         loads += [(spring, tension * force) for spring in rod.driven]
     return loads

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, sqrt, total, where
+from kinetostat.algebra.scalar import Scalar, inner_product, is_zero, reciprocal, sqrt, total, where
 from kinetostat.algebra.solve import Eliminated, Row, definite, elimination
 from kinetostat.algebra.symmetric import greatest_eigenvalue
 from kinetostat.arrays import Array
@@ -257,7 +257,7 @@ class Tangent:
             right = [[a * b for a, b in zip(row, self._factors.shrink, strict=True)] for row in left]
         else:
             left, right = rows, [self._factors.solve(row) for row in rows]
-        compliance = [[total([a * b for a, b in zip(row, column, strict=True)]) for column in right] for row in left]
+        compliance = [[inner_product(row, column) for column in right] for row in left]
         return [[_without_round_off(0.5 * (compliance[i][j] + compliance[j][i])) for j in range(6)] for i in range(6)]
 
     def factor(self) -> tuple[Scalar, Scalar]:

@@ -9,7 +9,7 @@ Source: theory (1) and (2); for margins section 2, "Singularities". Screws are a
 from collections.abc import Sequence
 from dataclasses import replace
 
-from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, sqrt, total, where
+from kinetostat.algebra.scalar import Scalar, inner_product, is_zero, reciprocal, sqrt, total, where
 from kinetostat.algebra.screw import Twist, Wrench, force_along, pure_moment
 from kinetostat.algebra.solve import complement
 from kinetostat.algebra.vector import AXES, ZERO, Vector
@@ -158,15 +158,15 @@ class TwoCentres:
         along_pair = [[dual.dot(axis) for dual in duals] for axis in self.pair_axes]
         first_force, both_forces, second_force = (
             (moments[i].dot(off_line[j]) + forces[i].dot(forces[j]))
-            * (float(i == j) + _inner(along_pair[i], along_pair[j]))
+            * (float(i == j) + inner_product(along_pair[i], along_pair[j]))
             for i, j in ((0, 0), (0, 1), (1, 1))
         )
         duals_with_forces = [
-            _inner(shares, [dual.dot(moment) for dual in duals])
+            inner_product(shares, [dual.dot(moment) for dual in duals])
             for shares, moment in zip(along_pair, off_line, strict=True)
         ]
         along_line = [dual.dot(line_moment) for dual in duals]
-        of_duals = dual_square - inverse_line_square * _inner(along_line, along_line)
+        of_duals = dual_square - inverse_line_square * inner_product(along_line, along_line)
         return of_duals + first_force + second_force + 2.0 * (both_forces - total(duals_with_forces))
 
     def _pair_forces(self, shrink: Scalar) -> list[Vector]:
@@ -180,7 +180,7 @@ class TwoCentres:
         pair_arm = arm + self.along * (self.distance * shrink)
         arms = float(BALL) * arm.dot(arm) + float(PAIR) * pair_arm.dot(pair_arm)
         along = [axis.dot(arm) for axis in self.ball_axes] + [axis.dot(pair_arm) for axis in self.pair_axes]
-        return float(PAIR + BALL) + (arms - _inner(along, along))
+        return float(PAIR + BALL) + (arms - inner_product(along, along))
 
 
 def two_centres(points: Sequence[Vector], axes: Sequence[Sequence[Vector]]) -> TwoCentres | None:
@@ -212,7 +212,3 @@ def _dual(axes: Sequence[Vector]) -> tuple[list[Vector], Scalar]:
         # small. The duals of the other two, unit vectors in a plane, both have the size 1 / sine of their angle.
         return [rows[0], second, rows[2]], 1.0 + 2.0 * (shrink * shrink)
     return rows, total([row.dot(row) for row in rows])
-
-
-def _inner(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
-    return total([p * q for p, q in zip(a, b, strict=True)])

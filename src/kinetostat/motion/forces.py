@@ -9,9 +9,10 @@ Source: theory (90)-(93). Units are those of `rigid`: forces in N, moments in N 
 
 from collections.abc import Sequence
 
-from kinetostat.algebra.scalar import Scalar, is_infinite, is_zero, sqrt, total, where
+from kinetostat.algebra.scalar import Scalar, inner_product, is_infinite, is_zero, sqrt, total, where
 from kinetostat.algebra.screw import NO_WRENCH, Twist, Wrench
-from kinetostat.algebra.solve import Row, complement, right_inverse
+from kinetostat.algebra.solve import Row, complement, identity, right_inverse
+from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import ZERO, Vector
 from kinetostat.frozen import dataclass
 from kinetostat.motion.rates import BodyMotion, LegMotion, MachineMotion
@@ -228,15 +229,12 @@ class DriveStatics:
 
 def drive_statics(machine: RigidMachine) -> DriveStatics:
     """Solve the statics of the drives; of more drives than ways, with the least energy in their springs."""
-    ways = machine.ways or tuple(_identity())
+    ways = machine.ways or tuple(identity(SIZE))
     by_twist: list[Row] = [[] for _ in machine.drives]
     for leg in machine.legs:
         for place, number in enumerate(leg.drives, leg.passive):
             by_twist[number] = leg.rates_by_twist[place]
-    rates = [
-        [total([a * b for a, b in zip(row, way, strict=True)]) for way in ways] if machine.ways else row
-        for row in by_twist
-    ]
+    rates = [[inner_product(row, way) for way in ways] if machine.ways else row for row in by_twist]
     weights = _weights(machine)
     weighted_rates = [[rate * share for rate in row] for row, share in zip(rates, weights, strict=True)]
     solution, _, _ = right_inverse([list(row) for row in zip(*weighted_rates, strict=True)])
@@ -260,13 +258,13 @@ def along_ways(machine: RigidMachine, ways: Sequence[Row], demand: ForceDemand) 
         for solved, force in zip(leg.rates_by_twist, row, strict=True):
             if not is_zero(force):
                 whole = [a + b * force for a, b in zip(whole, solved, strict=True)]
-    return [total([a * b for a, b in zip(way, whole, strict=True)]) for way in ways]
+    return [inner_product(way, whole) for way in ways]
 
 
 def drive_forces(machine: RigidMachine, statics: DriveStatics, demand: ForceDemand) -> Row:
     """Return the forces of the drives, positive along their motion: N of slides, N times the length of turns."""
     forces = along_ways(machine, statics.ways, demand)
-    return [total([a * b for a, b in zip(row, forces, strict=True)]) for row in statics.inverse]
+    return [inner_product(row, forces) for row in statics.inverse]
 
 
 def leg_wrenches(machine: RigidMachine, demand: ForceDemand, forces: Sequence[Scalar]) -> list[Wrench]:
@@ -303,12 +301,8 @@ def leg_wrenches(machine: RigidMachine, demand: ForceDemand, forces: Sequence[Sc
 
 def _constraint_amounts(machine: RigidMachine, constraints: Sequence[Row], imbalance: Wrench) -> Row:
     """Return the least amounts of the legs' constraint wrenches that balance the platform across its ways."""
-    basis = complement(machine.ways)[0] if machine.ways else _identity()
-    powers = [[total([a * b for a, b in zip(way, row, strict=True)]) for row in constraints] for way in basis]
+    basis = complement(machine.ways)[0] if machine.ways else identity(SIZE)
+    powers = [[inner_product(way, row) for row in constraints] for way in basis]
     solution, _, _ = right_inverse(powers)
-    missing = [total([a * b for a, b in zip(way, imbalance.components(), strict=True)]) for way in basis]
-    return [total([a * b for a, b in zip(row, missing, strict=True)]) for row in solution]
-
-
-def _identity() -> list[Row]:
-    return [[1.0 if i == j else 0.0 for i in range(6)] for j in range(6)]
+    missing = [inner_product(way, imbalance.components()) for way in basis]
+    return [inner_product(row, missing) for row in solution]

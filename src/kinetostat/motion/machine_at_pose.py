@@ -9,7 +9,7 @@ Source: theory (90)-(95). SI, unless said otherwise.
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 
-from kinetostat.algebra.scalar import Scalar, total
+from kinetostat.algebra.scalar import Scalar, inner_product, total
 from kinetostat.algebra.screw import NO_MOTION, NO_WRENCH, Twist, Wrench
 from kinetostat.algebra.solve import Row, dual_basis
 from kinetostat.algebra.vector import Vector
@@ -172,13 +172,13 @@ class Operators:
             for rows in zip(_product_with_transpose(self.coriolis, inverse), of_changes, strict=True)
         ]
         mass, coriolis = (_product_with_transpose(inverse, _transpose(rows)) for rows in (momenta, coriolis))
-        gravity = [total([a * b for a, b in zip(row, self.gravity, strict=True)]) for row in inverse]
+        gravity = [inner_product(row, self.gravity) for row in inverse]
         return mass, coriolis, gravity
 
 
 def _product_with_transpose(left: Sequence[Row], right: Sequence[Row]) -> list[Row]:
     """Return A B^T of two matrices, by their rows."""
-    return [[total([a * b for a, b in zip(row, other, strict=True)]) for other in right] for row in left]
+    return [[inner_product(row, other) for other in right] for row in left]
 
 
 def _transpose(rows: Sequence[Row]) -> list[Row]:

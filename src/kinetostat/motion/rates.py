@@ -11,7 +11,7 @@ Source: theory (85)-(89). Units are those of `rigid`.
 from collections.abc import Mapping, Sequence
 
 from kinetostat.algebra.jet import Jet
-from kinetostat.algebra.scalar import Scalar, sqrt, total
+from kinetostat.algebra.scalar import Scalar, inner_product, sqrt, total
 from kinetostat.algebra.screw import NO_MOTION, Twist
 from kinetostat.algebra.solve import Row, dual_basis
 from kinetostat.algebra.vector import Z_AXIS, ZERO, Displacement, Vector
@@ -160,7 +160,7 @@ def _sums_along(leg: RigidLeg, screws: Sequence[Twist], rates: Row) -> list[Twis
 
 
 def _product(row: Sequence[Scalar], twist: Twist) -> Scalar:
-    return total([a * b for a, b in zip(row, twist.components(), strict=True)])
+    return inner_product(row, twist.components())
 
 
 def machine_motion(
@@ -269,7 +269,7 @@ def _forced_change(machine: RigidMachine, motion: MachineMotion) -> Twist:
     It does not depend on how the platform's twist changes in this motion.
     """
     drifts = [
-        total([a * b for a, b in zip(row, leg_motion.drift.components(), strict=True)])
+        inner_product(row, leg_motion.drift.components())
         for leg, leg_motion in zip(machine.legs, motion.legs, strict=True)
         for row in leg.constraints
     ]

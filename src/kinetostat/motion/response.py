@@ -9,7 +9,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total
+from kinetostat.algebra.scalar import Scalar, inner_product, is_zero, sqrt, total
 from kinetostat.algebra.screw import Twist
 from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import ZERO
@@ -116,7 +116,7 @@ def _lost_motion_of_leg(leg: "RigidLeg", motion: Twist, length: Scalar) -> Scala
         length: length of the machine, m.
     """
     components = [*motion.rotational.components(), *(motion.translational * (1.0 / length)).components()]
-    rates = [total([a * b for a, b in zip(row, components, strict=True)]) for row in leg.rates_by_twist[: leg.passive]]
+    rates = [inner_product(row, components) for row in leg.rates_by_twist[: leg.passive]]
     in_balls = {place for ball in leg.balls for place in ball}
     parts = [
         abs(rate) * part.coulomb

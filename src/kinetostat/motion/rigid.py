@@ -16,7 +16,8 @@ import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, is_zero, total
 from kinetostat.algebra.screw import Twist, Wrench
-from kinetostat.algebra.solve import Row, right_inverse
+from kinetostat.algebra.solve import Row, identity, right_inverse
+from kinetostat.algebra.symmetric import SIZE
 from kinetostat.algebra.vector import Vector
 from kinetostat.equilibrium.elastic_legs import ElasticLeg, Masses
 from kinetostat.equilibrium.mechanism import Mechanism, mechanism_of
@@ -354,7 +355,7 @@ def _rates_and_constraints(columns: Sequence[Row], redundant: bool) -> tuple[lis
         solution, _, _ = right_inverse([list(row) for row in zip(*columns, strict=True)])
         return solution, []
     if not columns:
-        return [], [[1.0 if i == j else 0.0 for i in range(6)] for j in range(6)]
+        return [], identity(SIZE)
     solution, constraints, _ = right_inverse(columns)
     return [list(row) for row in zip(*solution, strict=True)], constraints
 
