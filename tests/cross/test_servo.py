@@ -182,6 +182,15 @@ def test_reversal_adds_play_and_friction_of_all_drives():
         kinetostat.compile(load("hexapod"), ["x"], "reversal_error_x")
 
 
+def test_an_integral_time_that_varies_removes_what_friction_holds_back_only_where_it_is_not_zero():
+    settings = ["drives.rotor_friction=0.02", "drives.guide_friction=30 N"]
+    varied = kinetostat.compile(hexapod(*settings), ["servo.integral_time"], "reversal_error_x")
+    for time in (0.0, 0.02):
+        single = kinetostat.compile(hexapod(*settings, f"servo.integral_time={time}"), ["x"], "reversal_error_x")
+        assert varied(time) == pytest.approx(single(0.01), rel=1e-12)
+    assert varied(0.0) > 1.5 * varied(0.02) > 0.0
+
+
 def test_a_machine_leg_by_leg_has_the_same_loops_of_its_own():
     """The same hexapod as a file leg by leg, whose legs have the names of the family's."""
     machine = hexapod("servo.integral_time=0.02", *OWN)

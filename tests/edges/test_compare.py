@@ -214,7 +214,7 @@ def test_files_are_designs_too(tmp_path, capsys):
 def test_a_design_without_an_answer_is_shown_and_told(capsys):
     assert main(["compare", PAPER, f"{PAPER}:pose.z=3 m", "--over", "z=66 cm:3 m:3"]) == 1
     said = " ".join(capsys.readouterr().out.split())
-    assert "would have to span 3 m" in said
+    assert "would have to span 3000 mm" in said
     assert "A 1 of 3, B 1 of 3" in said
 
 

@@ -87,7 +87,7 @@ def test_joints_that_are_all_at_the_platform_point_have_an_answer():
 
 def test_a_leg_without_a_place_does_not_say_how_long_it_would_be():
     message = analyze(load("passive-leg-4dof-rus", "pose.z=3 m")).message
-    assert "would have to span 3 m" in message
+    assert "would have to span 3000 mm" in message
     assert "nan" not in message
 
 

@@ -351,9 +351,10 @@ NEAR = {
 
 @pytest.mark.parametrize(("name", "change"), [*FAR.items(), *NEAR.items()])
 def test_out_of_reach_is_said_with_figures(name, change):
-    response = respond(with_values(load(name), change))
+    machine = with_values(load(name), change)
+    response = respond(machine)
     assert response.status == Status.OUT_OF_REACH
-    said = why_out_of_reach(response.configuration)
+    said = why_out_of_reach(response.configuration, machine.display)
     assert said
     assert "nan" not in said
     assert "inf" not in said

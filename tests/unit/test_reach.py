@@ -2,6 +2,7 @@
 
 import pytest
 
+from kinetostat.display import ENGINEERING
 from kinetostat.kinematics.closing import clearance, why_out_of_reach, within_reach
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.response import pose_status
@@ -34,15 +35,15 @@ def test_every_leg_must_close():
 
 
 def test_the_sentence_names_leg_figures_and_way_out():
-    message = why_out_of_reach(spanning(GOOD, FAR, NEAR))
-    for words in ("far leg", "1.25 m", "at most 1 m", "nearer", "near leg", "0.1 m", "at least 0.2 m", "away"):
+    message = why_out_of_reach(spanning(GOOD, FAR, NEAR), ENGINEERING)
+    for words in ("far leg", "1250 mm", "at most 1000 mm", "nearer", "near leg", "100 mm", "at least 200 mm", "away"):
         assert words in message
     assert "good leg" not in message
 
 
 def test_of_legs_that_miss_their_reach_alike_the_worst_is_named_and_the_others_are_counted():
-    message = why_out_of_reach(spanning(Closure("other leg", 1.2, 0.2, 1.0), FAR, GOOD))
-    assert message.startswith("The far leg would have to span 1.25 m")
+    message = why_out_of_reach(spanning(Closure("other leg", 1.2, 0.2, 1.0), FAR, GOOD), ENGINEERING)
+    assert message.startswith("The far leg would have to span 1250 mm")
     assert "1 more leg does not reach either" in message
     assert message.count(". ") == 0
 

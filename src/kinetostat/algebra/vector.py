@@ -205,6 +205,11 @@ def rotation_z(c: Scalar, s: Scalar) -> Rotation:
     return Rotation(Vector(c, s, 0.0), Vector(-s, c, 0.0), Z_AXIS)
 
 
+def rotation_of_angles(roll: Scalar, pitch: Scalar, yaw: Scalar) -> Rotation:
+    """Rotation Rz(yaw) Ry(pitch) Rx(roll), angles in rad: about x first and about z last, always about axes at rest."""
+    return rotation_z(cos(yaw), sin(yaw)) @ rotation_y(cos(pitch), sin(pitch)) @ rotation_x(cos(roll), sin(roll))
+
+
 def rotation_along(axis: Vector, c: Scalar, s: Scalar, rest: Scalar | None = None) -> Rotation:
     """Rotation about the unit vector `axis` by the angle whose cosine is c and sine s (Rodrigues).
 

@@ -78,16 +78,16 @@ class Chain:
                 stand.
         """
         count = len(coordinates)
-        small = _motions_of(errors or {}, count)
-        motion, before, carried = still(count), [], []
+        error_motions = _motions_of(errors or {}, count)
+        motion, before, with_error = still(count), [], []
         for number, step in enumerate(self._steps(coordinates, amounts)):
             before.append(motion)
-            motion = motion @ small[number] if number in small else motion
-            carried.append(motion)
-            motion = motion @ step if number or 0 in small else step  # nothing stands before the first
+            motion = motion @ error_motions[number] if number in error_motions else motion
+            with_error.append(motion)
+            motion = motion @ step if number or 0 in error_motions else step  # nothing stands before the first
         before.append(motion)
-        screws = each_twist(carried, _repeat(self.twists, count)) if carried else np.zeros((count, 0, 6))
-        end = motion @ small[len(carried)] if len(carried) in small else motion
+        screws = each_twist(with_error, _repeat(self.twists, count)) if with_error else np.zeros((count, 0, 6))
+        end = motion @ error_motions[len(with_error)] if len(with_error) in error_motions else motion
         return PlacedChain(tuple(before), end, screws)
 
     def _steps(self, coordinates: Array, amounts: Array | None) -> list[Motions]:
@@ -96,9 +96,9 @@ class Chain:
             return []
         if amounts is None:
             return each_about(self.twists, coordinates[:, self.coordinate])
-        pairs = zip(self.coordinate, self.given, strict=True)
-        motions = [amounts[:, driven] if by < 0 else coordinates[:, by] for by, driven in pairs]
-        return each_along(self.twists, np.stack(motions, axis=1))
+        sources = zip(self.coordinate, self.given, strict=True)
+        columns = [amounts[:, given] if coordinate < 0 else coordinates[:, coordinate] for coordinate, given in sources]
+        return each_along(self.twists, np.stack(columns, axis=1))
 
     def rates(self, placed: PlacedChain) -> Array:
         """Return the twist of the end per unit of each coordinate [n x 6 x coordinates]."""
@@ -115,6 +115,7 @@ def bar_turns(bars: Parallelogram) -> tuple[Joint, Joint, Scalar]:
 
 
 def _matches(numbers: tuple[int, ...], count: int) -> Array:
+    """Return 1 where a number is that of the column, else 0 [numbers x count]; -1 matches none."""
     return (np.array(numbers, dtype=int)[:, None] == np.arange(count)).astype(float)
 
 

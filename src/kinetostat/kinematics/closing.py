@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kinetostat.algebra.scalar import Scalar, cos, is_zero, sin, smaller, sqrt
-from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector, rotation_x, rotation_y, rotation_z
+from kinetostat.algebra.vector import ZERO, Displacement, Rotation, Vector, rotation_of_angles
 from kinetostat.arrays import Array
+from kinetostat.display import Display
 from kinetostat.frozen import dataclass
+from kinetostat.kinematics.limits import DIGITS_OF_LIMIT
 from kinetostat.late import LateModule
 from kinetostat.machine.column import column, plain, stacked_columns
 from kinetostat.machine.leg import Joint, Turn
@@ -29,6 +31,7 @@ else:
     family = LateModule("kinetostat.machine.written.family")
 
 POINT, ANGLES = ("x", "y", "z"), ("roll", "pitch", "yaw")
+"""Names of the coordinates of a pose: those of the platform point, and those of the platform's orientation."""
 
 
 @dataclass(frozen=True)
@@ -51,15 +54,15 @@ def clearance(closure: Closure) -> Scalar:
 
 
 def within_reach(configuration: Configuration) -> Scalar:
-    """Tell whether every leg closes."""
+    """Return whether every leg closes."""
     result: Scalar = True
     for closure in configuration.closures:
         result = (clearance(closure) >= 0.0) & result
     return result
 
 
-def why_out_of_reach(configuration: Configuration) -> str:
-    """Say which leg misses its reach by most, with lengths in m and what to change: a sentence for each way to miss."""
+def why_out_of_reach(configuration: Configuration, display: Display) -> str:
+    """Say which leg is farthest beyond its reach and what to change, a sentence for each way to miss."""
     # If the first part of a leg does not close, its next part has no place, and so its span is NaN.
     open_legs = [c for c in configuration.closures if clearance(c) < 0.0 and not isnan(c.span)]
     ways = (
@@ -67,48 +70,48 @@ def why_out_of_reach(configuration: Configuration) -> str:
         (False, "at least", "move the platform away or make its links more equal in length"),
     )
     sentences = []
-    for too_far, least, advice in ways:
+    for too_far, bound, advice in ways:
         legs = sorted((c for c in open_legs if (c.span > c.longest) is too_far), key=clearance)
         if not legs:
             continue
         worst, others = legs[0], len(legs) - 1
-        limit = worst.longest if too_far else worst.shortest
+        lengths = (worst.span, worst.longest if too_far else worst.shortest)
+        span, limit = (display.show(float(length), "m", digits=DIGITS_OF_LIMIT) for length in lengths)
         more = f", and {others} more {'legs do' if others > 1 else 'leg does'} not reach either" if others else ""
         sentences.append(
-            f"The {worst.leg} would have to span {worst.span:.6g} m, but its links can span {least} {limit:.6g} m{more}"
-            f"; {advice}."
+            f"The {worst.leg} would have to span {span}, but its links can span {bound} {limit}{more}; {advice}."
         )
     return " ".join(sentences) or "The legs cannot reach the platform at this pose; move it nearer to the home pose."
 
 
 def platform_placement(chains: Chains) -> Displacement:
     """Place the platform at the pose; missing positions are those of the home pose, and missing angles are 0."""
-    home = chains.home.translation
-    return placement_of({name: getattr(home, name) for name in POINT} | dict.fromkeys(ANGLES, 0.0) | dict(chains.pose))
+    home = dict(zip(POINT, chains.home.translation.components(), strict=True))
+    return placement_of(home | dict.fromkeys(ANGLES, 0.0) | dict(chains.pose))
 
 
 def placement_of(pose: Mapping[str, Scalar]) -> Displacement:
     """Place the platform at a pose of which all coordinates are given, m and rad."""
-    roll, pitch, yaw = (pose[name] for name in ANGLES)
-    turn = rotation_z(cos(yaw), sin(yaw)) @ rotation_y(cos(pitch), sin(pitch)) @ rotation_x(cos(roll), sin(roll))
-    return Displacement(turn, Vector(pose["x"], pose["y"], pose["z"]))
+    return Displacement(
+        rotation_of_angles(pose["roll"], pose["pitch"], pose["yaw"]), Vector(pose["x"], pose["y"], pose["z"])
+    )
 
 
 def free_coordinates(chains: Chains) -> tuple[str, ...]:
-    """Coordinates that the pose does not give, without those out of the plane of a machine that only moves in one."""
-    staying = ("z", "roll", "pitch") if stays_in_plane(chains) else ()
-    return tuple(name for name in (*POINT, *ANGLES) if name not in chains.pose and name not in staying)
+    """Return the coordinates that the pose leaves to the machine; none out of its plane for one that stays in it."""
+    out_of_plane = ("z", "roll", "pitch") if stays_in_plane(chains) else ()
+    return tuple(name for name in (*POINT, *ANGLES) if name not in chains.pose and name not in out_of_plane)
 
 
 def stays_in_plane(chains: Chains) -> bool:
-    """Tell whether no joint moves anything out of the x-y plane."""
+    """Return whether no joint moves anything out of the x-y plane."""
     return all(_in_plane(step.element.mover) for steps in chains.legs for step in steps if step.moves)
 
 
 def _in_plane(mover: Joint) -> bool:
-    along = np.max(np.abs(np.asarray(plain(mover.axis.z), dtype=float)))
-    across = max(np.max(np.abs(np.asarray(plain(c), dtype=float))) for c in (mover.axis.x, mover.axis.y))
-    return bool(is_zero(mover.pitch) and (along if mover.point is None else across) <= PARALLEL_AXES)
+    """Return whether a joint is a slide in the x-y plane, or turns about an axis across it."""
+    x, y, z = (np.max(np.abs(np.asarray(plain(c), dtype=float))) for c in mover.axis.components())
+    return bool(is_zero(mover.pitch) and (z if mover.point is None else max(x, y)) <= PARALLEL_AXES)
 
 
 @dataclass(frozen=True)
@@ -176,7 +179,7 @@ def _rotation_gap(start: Rotation, end: Rotation, length: Scalar) -> list[Scalar
 
 
 def rotation_between(start: Rotation, end: Rotation) -> Vector:
-    """The rotation vector from one rotation to another, to first order: its length is the sine of the angle."""
+    """Return the rotation vector from one rotation to another, to first order: its length is the sine of the angle."""
     turn = ZERO
     for a, b in ((start.x, end.x), (start.y, end.y), (start.z, end.z)):
         turn = turn + a.cross(b)
@@ -189,16 +192,15 @@ def _off_pose(chains: Chains, end: Displacement) -> list[Scalar]:
     gaps = [pose[name] - getattr(end.translation, name) for name in POINT if name in pose]
     if all(name in pose for name in ANGLES):
         return gaps + _rotation_gap(end.rotation, platform_placement(chains).rotation, chains.length)
-    sides = _sides(end.rotation)
+    given_angles = {name: sides for name, sides in _cosines_and_sines(end.rotation).items() if name in pose}
     return gaps + [
-        chains.length * (sin(pose[name]) * sides[name][0] - cos(pose[name]) * sides[name][1])
-        for name in ANGLES
-        if name in pose
+        chains.length * (sin(pose[name]) * cosine - cos(pose[name]) * sine)
+        for name, (cosine, sine) in given_angles.items()
     ]
 
 
-def _sides(turn: Rotation) -> dict[str, tuple[Scalar, Scalar]]:
-    """Cosine and sine of roll, pitch and yaw of Q = Rz(yaw) Ry(pitch) Rx(roll), each up to a common factor."""
+def _cosines_and_sines(turn: Rotation) -> dict[str, tuple[Scalar, Scalar]]:
+    """Cosine and sine of roll, pitch and yaw, as `rotation_of_angles` takes them, each pair up to a common factor."""
     flat = sqrt(turn.x.x * turn.x.x + turn.x.y * turn.x.y)
     return {"roll": (turn.z.z, turn.y.z), "pitch": (flat, -turn.x.z), "yaw": (turn.x.x, turn.x.y)}
 
@@ -206,9 +208,9 @@ def _sides(turn: Rotation) -> dict[str, tuple[Scalar, Scalar]]:
 def squared_distance(start: Displacement, end: Displacement, length: Scalar) -> Scalar:
     """Return the squared distance between two placements, in rad and units of the length; 0 only if they are equal."""
     shift = (end.translation - start.translation) * (1.0 / length)
-    turns = ((start.rotation.x, end.rotation.x), (start.rotation.y, end.rotation.y), (start.rotation.z, end.rotation.z))
+    axes = ((start.rotation.x, end.rotation.x), (start.rotation.y, end.rotation.y), (start.rotation.z, end.rotation.z))
     square: Scalar = shift.dot(shift)
-    for difference in [a - b for a, b in turns]:
+    for difference in [a - b for a, b in axes]:
         square = square + 0.5 * difference.dot(difference)
     return square
 
@@ -243,7 +245,8 @@ def gaps_at(chains: Chains, coordinates: Array) -> Gaps:
     scale = np.stack([np.ones(count)] * 3 + [1.0 / length] * 3, axis=1)[:, :, None] * units_of(chains, length)[:, None]
     twists = [block * scale for block in _platform_twists(ends, count)]
     closure = stacked_columns(_between_legs(ends, length), count) / length[:, None]
-    closure_rates = [np.zeros((count, 0, chains.size)), *(block - twists[0] for block in twists[1:])]
+    no_rates = np.zeros((count, 0, chains.size))  # a single leg has no gap
+    closure_rates = [no_rates, *(block - twists[0] for block in twists[1:])]
     return Gaps(closure, np.concatenate(closure_rates, axis=1), twists[0])
 
 
@@ -267,6 +270,6 @@ def _platform_twists(ends: Sequence[LegEnd], count: int) -> list[Array]:
 
 
 def pose_coordinates(end: Displacement) -> dict[str, Array]:
-    """Pose coordinates of a placement: P (m) and the angles of Q = Rz(yaw) Ry(pitch) Rx(roll) (rad), arrays [n]."""
-    angles = {name: np.arctan2(sine, cosine) for name, (cosine, sine) in _sides(end.rotation).items()}
+    """Return the coordinates of a placement: P (m), and the angles (rad) of `rotation_of_angles`, arrays [n]."""
+    angles = {name: np.arctan2(sine, cosine) for name, (cosine, sine) in _cosines_and_sines(end.rotation).items()}
     return {name: np.asarray(getattr(end.translation, name)) for name in POINT} | angles

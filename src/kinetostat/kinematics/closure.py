@@ -150,24 +150,27 @@ class ClosedForms:
 
         NOT_CONVERGED says that the legs close only if coordinates which the pose does not give differ from those of
         the home pose, which Newton's method finds.
+
+        Raises:
+            ValueError: a leg has no closed form; `solver_of` does not choose this solver then.
         """
         placement = platform_placement(chains)
         motion = placement @ chains.home.inverse()
         amounts: list[Scalar | Turn] = []
         reached: Scalar = True
-        gap: Scalar = 0.0
+        squared_gap: Scalar = 0.0
         for inverse, steps in zip(chains.inverses, chains.legs, strict=True):
             if inverse is None:
                 raise ValueError("a leg without a closed form")
             leg = inverse.close(steps, motion)
             amounts += leg.amounts
             reached = (clearance(leg.closure) >= 0.0) & reached
-            left = leg.gap
-            if left is None:
+            leg_gap = leg.gap
+            if leg_gap is None:
                 end = leg_end(steps, chains.home, iter(leg.amounts)).platform
-                left = squared_distance(end, placement, chains.length)
-            gap = gap + left
-        status = where(gap < CLOSED * CLOSED, int(Status.OK), int(Status.NOT_CONVERGED))
+                leg_gap = squared_distance(end, placement, chains.length)
+            squared_gap = squared_gap + leg_gap
+        status = where(squared_gap < CLOSED * CLOSED, int(Status.OK), int(Status.NOT_CONVERGED))
         return Joints(tuple(amounts), where(reached, status, int(Status.OUT_OF_REACH)))
 
 
@@ -194,10 +197,10 @@ def joints_followed(chains: Chains, goal: Array, chosen: Mask | None = None) -> 
     groups = problems_of(chains, count, free)
     if chosen is not None:
         groups = [group.subset(np.flatnonzero(chosen[group.poses])) for group in groups]
-    stated = [(group, goal_of(group, goal)) for group in groups]
-    for group, group_goal in stated:
+    groups_with_goals = [(group, goal_of(group, goal)) for group in groups]
+    for group, group_goal in groups_with_goals:
         status[group.poses[too_far_or_near(group, group_goal)]] = int(Status.OUT_OF_REACH)
-    for group, group_goal in stated:
+    for group, group_goal in groups_with_goals:
         tried = np.flatnonzero(status[group.poses] == Status.OK)
         problems, tried_goal = group.subset(tried), coordinates_at(group_goal, tried)
         unknowns, codes = follow(problems, tried_goal)
@@ -232,7 +235,7 @@ def _with_undetermined(problems: Problems, unknowns: Array, goal: Coordinates, c
     damping = LEAST_NORM_DAMPING * np.trace(square, axis1=1, axis2=2)
     moving = np.eye(problems.size)[:, problems.size - len(problems.free) :]
     freedom = np.linalg.solve(with_damping(square), np.broadcast_to(moving, (len(rates), *moving.shape)))
-    loose = (freedom * moving).sum(axis=(1, 2)) * damping > UNDETERMINED
+    is_undetermined = (freedom * moving).sum(axis=(1, 2)) * damping > UNDETERMINED
     codes = codes.copy()
-    codes[solved[loose]] = int(Status.SINGULAR)
+    codes[solved[is_undetermined]] = int(Status.SINGULAR)
     return codes

@@ -9,6 +9,8 @@ Source: theory (22) and section 6; P. Deuflhard, Newton Methods for Nonlinear Pr
 that are accepted by the contraction of Newton's method.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from kinetostat.arrays import Array, Integers, Mask
@@ -104,16 +106,31 @@ def _by_way(problems: Problems, plan: Plan, goal: Coordinates) -> tuple[Array, M
 
     A solution at the goal in another mode has crossed to it by too long a step, and is followed again in shorter ones.
     """
-    unknowns, solved, crossed = _strides(problems, plan(problems, goal), goal, LONGEST_STRIDE)
-    crossing = np.flatnonzero(crossed)
+    ends = _ends_of_way(problems, plan(problems, goal), goal, LONGEST_STRIDE)
+    crossing = np.flatnonzero(ends.crossed)
     if crossing.size:
         part, target = problems.subset(crossing), coordinates_at(goal, crossing)
-        unknowns[crossing], solved[crossing], _ = _strides(part, plan(part, target), target, CAREFUL_STRIDE)
-    return unknowns, solved
+        careful = _ends_of_way(part, plan(part, target), target, CAREFUL_STRIDE)
+        ends.unknowns[crossing], ends.solved[crossing] = careful.unknowns, careful.solved
+    return ends.unknowns, ends.solved
 
 
-def _strides(problems: Problems, way: Way, goal: Coordinates, longest: float) -> tuple[Array, Mask, Mask]:
-    """Follow solutions along a way; return where they end, whether at the goal in the same mode, or in another one."""
+class _EndsOfWay(NamedTuple):
+    """Solutions at the end of a way, as far as it is open.
+
+    Attributes:
+        unknowns: the unknowns there [problems x unknowns].
+        solved: whether that is at the goal, in the assembly mode of the home pose [problems].
+        crossed: whether that is at the goal, in another mode [problems].
+    """
+
+    unknowns: Array
+    solved: Mask
+    crossed: Mask
+
+
+def _ends_of_way(problems: Problems, way: Way, goal: Coordinates, longest: float) -> _EndsOfWay:
+    """Follow solutions along a way, in steps that change no unknown by more than `longest`."""
     unknowns, arrived = _along(problems, way, longest)
     solved, crossed = np.zeros((2, len(unknowns)), dtype=bool)
     ended = np.flatnonzero(arrived)
@@ -125,9 +142,9 @@ def _strides(problems: Problems, way: Way, goal: Coordinates, longest: float) ->
             equations, unknowns[ended], len(ended), most_steps=steps, residual_goal=NEWTON_SETTLED, contraction=1.0
         )
         unknowns[ended] = end.value
-        closed, same = end.residual <= CLOSED, same_mode(part, end.value, target)
-        solved[ended], crossed[ended] = closed & same, closed & ~same
-    return unknowns, solved, crossed
+        is_closed, is_same_mode = end.residual <= CLOSED, same_mode(part, end.value, target)
+        solved[ended], crossed[ended] = is_closed & is_same_mode, is_closed & ~is_same_mode
+    return _EndsOfWay(unknowns, solved, crossed)
 
 
 def _along(problems: Problems, way: Way, longest: float) -> tuple[Array, Mask]:
@@ -221,20 +238,24 @@ def _least_gap(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[
 def _updated_inverse(inverse: Array, step: Array, change: Array) -> Array:
     """Correct inverse curvatures so that steps have the changes of slope that were met (BFGS).
 
+    Where a step shows no positive curvature, the inverse stays as it is.
+
     Args:
         inverse: [n x unknowns x unknowns].
         step: [n x unknowns].
         change: how much less steep it is at the end of the step [n x unknowns].
     """
     work = np.einsum("nc,nc->n", step, change)
-    sound = work > NO_CURVATURE * np.linalg.norm(step, axis=1) * np.linalg.norm(change, axis=1)
-    weight = np.where(sound, 1.0 / np.where(sound, work, 1.0), 0.0)[:, None, None]
+    is_convex = work > NO_CURVATURE * np.linalg.norm(step, axis=1) * np.linalg.norm(change, axis=1)
+    weight = np.where(is_convex, 1.0 / np.where(is_convex, work, 1.0), 0.0)[:, None, None]
     across = np.eye(step.shape[1]) - weight * step[:, :, None] * change[:, None, :]
     return np.asarray(across @ inverse @ np.swapaxes(across, 1, 2) + weight * step[:, :, None] * step[:, None, :])
 
 
 def same_mode(problems: Problems, unknowns: Array, goal: Coordinates) -> Mask:
-    """Tell which solutions may be in the assembly mode of the home pose: all those whose sign does not differ.
+    """Tell which solutions may be in the assembly mode of the home pose: those whose sign does not differ.
+
+    Where the pose leaves coordinates open, there is no sign, and all of them may be.
 
     Args:
         problems: the problems that have been solved.

@@ -45,14 +45,16 @@ else:
 MOST_DAMPED_STEPS = 60
 """Number of steps of damped least squares: a start that has not arrived by then is in no solution's reach."""
 CENTRAL_DIFFERENCE = 1e-6
-"""Step of central differences, rad or in units of the machine's length: the half of all digits that steps need."""
+"""Step of central differences, rad or in units of the machine's length: their error is its square, 1e-12, and round-off
+adds about 1e-16 over the step; rates of ten digits are more than steps need."""
 STRIDE = 0.05
 """Motion of the actuators in one step on the way from the pose of the machine, rad or in units of its length: from one
 step to the next, Newton's method stays with the solution."""
 MOST_STRIDES = 400
 """Most steps of a way, which are some three turns; a longer way is gone in longer steps."""
 LEAP = 0.5
-"""Change of an unknown in one of these steps that shows a jump to another solution."""
+"""Change of an unknown in one of these steps that shows a jump to another solution: ten times that of the actuators,
+which a machine only exceeds beside a singularity."""
 
 
 @dataclass(frozen=True)
@@ -133,18 +135,18 @@ class ByPose:
         return with_values(self.machine, dict(zip(self.kinds, (unknowns * self.units).T, strict=True)))
 
     def _missing(self, unknowns: Array, goal: Array) -> Array:
-        """Coordinates that the actuators lack [n x actuators]; NaN where a leg does not reach."""
+        """Differences of the actuators from their goals [n x actuators]; NaN where a leg does not reach."""
         actuators = actuators_of(self._with_unknowns(unknowns).configure())
         return _differences(self, goal, [actuator.coordinate for actuator in actuators], len(unknowns))
 
     def residuals(self, unknowns: Array, goal: Array) -> tuple[Array, Array]:
         """See `System`; the rates [n x actuators x unknowns] are central differences, all of them in one batch."""
         count, size = unknowns.shape
-        ways = CENTRAL_DIFFERENCE * np.concatenate([np.zeros((1, size)), np.eye(size), -np.eye(size)])
-        goals = np.repeat(np.broadcast_to(goal, (count, goal.shape[-1])), len(ways), axis=0)
-        missing = self._missing((unknowns[:, None] + ways).reshape(-1, size), goals).reshape(count, len(ways), -1)
-        rates = (missing[:, size + 1 :] - missing[:, 1 : size + 1]) / (2.0 * CENTRAL_DIFFERENCE)
-        return missing[:, 0], np.swapaxes(rates, 1, 2)
+        shifts = CENTRAL_DIFFERENCE * np.concatenate([np.zeros((1, size)), np.eye(size), -np.eye(size)])
+        goals = np.repeat(np.broadcast_to(goal, (count, goal.shape[-1])), len(shifts), axis=0)
+        missing = self._missing((unknowns[:, None] + shifts).reshape(-1, size), goals).reshape(count, len(shifts), -1)
+        unshifted, forward, backward = missing[:, 0], missing[:, 1 : size + 1], missing[:, size + 1 :]
+        return unshifted, np.swapaxes((backward - forward) / (2.0 * CENTRAL_DIFFERENCE), 1, 2)
 
     def placements(self, unknowns: Array, _goal: Array) -> list[Displacement]:
         """See `System` [n x unknowns]."""
@@ -278,15 +280,14 @@ def stand(machine: Machine, joints: Joints | None = None) -> list[Actuator]:
 
 def undriven(system: System) -> bool:
     """Whether the platform can move at the pose of the machine while all actuators stand still."""
-    goal = np.array([actuator.coordinate for actuator in system.actuators], dtype=float)
-    rates = system.residuals(system.start[None], goal)[1][0]
-    size, full = rates.shape[1], np.isfinite(rates).all()
-    if not full or size == 0:
+    rates = system.residuals(system.start[None], _coordinates(system))[1][0]
+    if not np.isfinite(rates).all() or rates.shape[1] == 0:
         return False
-    _, sizes, ways = np.linalg.svd(rates, full_matrices=True)
-    weights = np.concatenate([sizes, np.zeros(size - len(sizes))]) if size > len(sizes) else sizes
-    idle = ways[weights < UNDRIVEN * max(weights.max(), 1.0)]
-    return bool(np.abs(system.drift() @ idle.T).max(initial=0.0) > UNDRIVEN)
+    _, values, motions = np.linalg.svd(rates, full_matrices=True)
+    sizes = np.zeros(len(motions))
+    sizes[: len(values)] = values
+    idle_motions = motions[sizes < UNDRIVEN * max(sizes.max(), 1.0)]
+    return bool(np.abs(system.drift() @ idle_motions.T).max(initial=0.0) > UNDRIVEN)
 
 
 def assembly_modes(system: System, goal: Array, starts: int, spread: float) -> list[AssemblyMode]:
@@ -301,6 +302,7 @@ def assembly_modes(system: System, goal: Array, starts: int, spread: float) -> l
     Returns:
         Each mode once, the present one first, then in the order of their distance from the pose of the machine.
     """
+    # The seed is fixed, so that the modes that are found never depend on chance.
     shifts = np.random.default_rng(0).uniform(-spread, spread, (starts, system.start.size))
     with np.errstate(all="ignore"):
         ends, arrived = _ends_of_ways(system, goal[None])
@@ -315,11 +317,15 @@ def assembly_modes(system: System, goal: Array, starts: int, spread: float) -> l
         if all(squared_distance(places[i], places[k], system.length) > ONE_PLACEMENT**2 for k in kept):
             kept.append(i)
     modes = [system.mode(solutions[i], goal) for i in kept]
-    kinds = zip(modes, system.by_pose([mode.pose for mode in modes], goal) if modes else [], strict=True)
-    return [replace(mode, present=bool(arrived[0]) and i == 0, by_pose=by) for i, (mode, by) in enumerate(kinds)]
+    flags = system.by_pose([mode.pose for mode in modes], goal) if modes else []
+    return [
+        replace(mode, present=bool(arrived[0]) and i == 0, by_pose=by_pose)
+        for i, (mode, by_pose) in enumerate(zip(modes, flags, strict=True))
+    ]
 
 
 def _coordinates(system: System) -> Array:
+    """Coordinates of the actuators at the pose of the machine, m and rad [actuators]."""
     return np.array([actuator.coordinate for actuator in system.actuators], dtype=float)
 
 
@@ -353,12 +359,12 @@ def _ends_of_ways(system: System, goals: Array) -> tuple[Array, Mask]:
     """
     start, unknowns = _coordinates(system), np.tile(system.start, (len(goals), 1))
     scale = np.array([system.length if actuator.slides else 1.0 for actuator in system.actuators])
-    sound = np.asarray(np.isfinite(goals - start).all(axis=1))
-    way = np.where(sound[:, None], goals - start, 0.0)
+    is_open = np.asarray(np.isfinite(goals - start).all(axis=1))  # the way, as far as it has been gone
+    way = np.where(is_open[:, None], goals - start, 0.0)
     steps = int(np.clip(np.ceil(np.abs(way / scale).max(initial=0.0) / STRIDE), 1, MOST_STRIDES))
     last_signs = np.zeros(len(goals))
     for step in range(steps + 1):
-        rows = np.flatnonzero(sound)
+        rows = np.flatnonzero(is_open)
         if not rows.size:
             break
         target = start + way[rows] * (step / steps)
@@ -367,9 +373,9 @@ def _ends_of_ways(system: System, goals: Array) -> tuple[Array, Mask]:
         # The determinant changes its sign at a singularity.
         signs = np.sign(np.linalg.det(rates)) if rates.shape[1] == rates.shape[2] else np.zeros(len(rows))
         change = np.abs(solution - unknowns[rows]).max(axis=1, initial=0.0)
-        sound[rows] = (largest <= CLOSED) & (change <= LEAP) & ~(signs * last_signs[rows] < 0.0)
+        is_open[rows] = (largest <= CLOSED) & (change <= LEAP) & ~(signs * last_signs[rows] < 0.0)
         unknowns[rows], last_signs[rows] = solution, signs
-    return unknowns, sound
+    return unknowns, is_open
 
 
 def _solutions(

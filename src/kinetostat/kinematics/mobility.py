@@ -22,6 +22,7 @@ from kinetostat.spec.renamed import former_names
 from kinetostat.tolerances import DEPENDENT, NEGLIGIBLE_COMPONENT, PURE_TRANSLATION
 
 TWISTS_IN_SPACE = 6
+"""Number of independent twists of a body in space: of these, what holds the platform takes its rank away."""
 
 
 class SortOfPose(StrEnum):
@@ -91,7 +92,9 @@ def mobility(configuration: Configuration, nearby: Sequence[Configuration], refe
     full_cycle = min(pose.platform for pose in general)
     general_ranks = [max(pose.legs[i] for pose in general) for i in range(len(configuration.legs))]
     lost = tuple(
-        leg.name for leg, has, may in zip(configuration.legs, ranks.legs, general_ranks, strict=True) if has < may
+        leg.name
+        for leg, rank, general_rank in zip(configuration.legs, ranks.legs, general_ranks, strict=True)
+        if rank < general_rank
     )
     constraints, holding = _platform_wrenches(configuration, reference)
     kind = SortOfPose.REGULAR
@@ -103,11 +106,11 @@ def mobility(configuration: Configuration, nearby: Sequence[Configuration], refe
     elif lost:
         kind = SortOfPose.LEG
     absent = _twists_absent(configuration)
-    legs = [
-        _least(_leg_screws(configuration, leg, reference), rank + absent)
+    leg_least_values = [
+        _singular_value(_leg_screws(configuration, leg, reference), rank + absent)
         for leg, rank in zip(configuration.legs, general_ranks, strict=True)
     ]
-    actuators = sum(len(_drives(leg)) for leg in configuration.legs)
+    actuators = sum(len(_driven_joints(leg)) for leg in configuration.legs)
     return Mobility(
         here=ranks,
         full_cycle=full_cycle,
@@ -115,8 +118,8 @@ def mobility(configuration: Configuration, nearby: Sequence[Configuration], refe
         kind=kind,
         lost=lost,
         twists=twists,
-        leg_least_singular_value=min(legs, default=1.0),
-        platform_least_singular_value=_least(holding, TWISTS_IN_SPACE),
+        leg_least_singular_value=min(leg_least_values, default=1.0),
+        platform_least_singular_value=_singular_value(holding, TWISTS_IN_SPACE),
     )
 
 
@@ -132,15 +135,15 @@ def freedoms(configuration: Configuration, reference: Vector) -> Freedoms:
     constraints, holding = _platform_wrenches(configuration, reference)
     rank = _rank(constraints)
     imposed = sum(TWISTS_IN_SPACE - absent - leg for leg in legs)
-    spins = sum(
-        len(_drives(leg)) + len(_free(leg)) + sum(spring.hinge for spring in leg.springs) - has
-        for leg, has in zip(configuration.legs, legs, strict=True)
+    idle = sum(
+        len(_driven_joints(leg)) + len(_free_joints(leg)) + sum(spring.hinge for spring in leg.springs) - rank_of_leg
+        for leg, rank_of_leg in zip(configuration.legs, legs, strict=True)
         if not leg.lines
     )
     return Freedoms(
         platform=TWISTS_IN_SPACE - rank,
         legs=tuple(legs),
-        idle=spins,
+        idle=idle,
         redundant=imposed - (rank - absent),
         locked=TWISTS_IN_SPACE - _rank(holding),
     )
@@ -167,12 +170,12 @@ def task_coordinates(configuration: Configuration, reference: Vector) -> tuple[i
     return tuple(kept)
 
 
-def _drives(leg: Leg) -> list[Joint]:
+def _driven_joints(leg: Leg) -> list[Joint]:
     """The joints that actuators hold; one without stiffness holds nothing."""
     return [spring.joint for spring in leg.springs if spring.actuated and float(spring.stiffness) > 0.0]
 
 
-def _free(leg: Leg) -> list[Joint]:
+def _free_joints(leg: Leg) -> list[Joint]:
     """All joints that nothing holds."""
     return [*leg.passive, *(spring.joint for spring in leg.springs if float(spring.stiffness) == 0.0)]
 
@@ -181,7 +184,7 @@ def _leg_screws(configuration: Configuration, leg: Leg, reference: Vector) -> Ar
     """Unit screws of all joints of a leg, actuated ones and flexures too, and of what a plane takes away [6 x n]."""
     absent = configuration.plane.missing_freedoms if configuration.plane else ()
     hinges = [spring.joint for spring in leg.springs if spring.hinge and float(spring.stiffness) > 0.0]
-    joints = (*_free(leg), *hinges, *_drives(leg), *absent)
+    joints = (*_free_joints(leg), *hinges, *_driven_joints(leg), *absent)
     return _unit_screws([joint.twist(reference) for joint in joints], configuration)
 
 
@@ -205,11 +208,11 @@ def _platform_wrenches(configuration: Configuration, reference: Vector) -> tuple
     constraints, holding = list(guide), list(guide)
     for leg in configuration.legs:
         constraints.append(_reciprocal(_leg_screws(configuration, leg, reference)))
-        if leg.lines and len(_free(leg)) == len(leg.passive):
+        if leg.lines and len(_free_joints(leg)) == len(leg.passive):
             wrenches = columns([line.wrench(reference) for line in leg.lines], 1.0 / length, 1.0)
             holding.append(wrenches / np.linalg.norm(wrenches, axis=0))
         else:
-            passive = [joint.twist(reference) for joint in (*_free(leg), *absent)]
+            passive = [joint.twist(reference) for joint in (*_free_joints(leg), *absent)]
             holding.append(_reciprocal(_unit_screws(passive, configuration)))
     return np.hstack(constraints), np.hstack(holding)
 
@@ -224,10 +227,10 @@ def _rank(matrix: Array) -> int:
     return int((np.linalg.svd(matrix, compute_uv=False) > DEPENDENT).sum()) if matrix.size else 0
 
 
-def _least(matrix: Array, rank: int) -> float:
-    """The singular value of number `rank`, the least that a regular pose has."""
+def _singular_value(matrix: Array, number: int) -> float:
+    """The singular value of a number, from 1: of the rank at regular poses, it is the least; 0 if there is none."""
     sizes = np.linalg.svd(matrix, compute_uv=False)
-    return float(sizes[rank - 1]) if 0 < rank <= len(sizes) else 0.0
+    return float(sizes[number - 1]) if 0 < number <= len(sizes) else 0.0
 
 
 def _free_twists(wrenches: Array, count: int, length: float) -> tuple[tuple[float, ...], ...]:
@@ -260,8 +263,13 @@ def conditioning(legs: Sequence[LegScrews], length: float, guide: Sequence[Wrenc
     Returns:
         The singular values, N; there are 6, or fewer if there are fewer wrenches [n].
     """
+    return np.asarray(np.linalg.svd(_comparable_wrenches(legs, length, guide), compute_uv=False), dtype=float)
+
+
+def _comparable_wrenches(legs: Sequence[LegScrews], length: float, guide: Sequence[Wrench]) -> Array:
+    """Return W: the wrenches of all legs and then those of a guide, with moments divided by the length [6 x n]."""
     wrenches = [*(wrench for leg in legs for wrench in leg.wrenches), *guide]
-    return np.asarray(np.linalg.svd(columns(wrenches, 1.0 / length, 1.0), compute_uv=False), dtype=float)
+    return columns(wrenches, 1.0 / length, 1.0)
 
 
 def count_independent(screws: Sequence[Screw], translational_scale: float, tolerance: float) -> int:
@@ -283,8 +291,7 @@ def free_twist(legs: Sequence[LegScrews], length: float, guide: Sequence[Wrench]
     Returns:
         [omega; v] at P in base axes, with a rotation of 1 rad, or of 1 m if it is a pure translation.
     """
-    wrenches = [*(wrench for leg in legs for wrench in leg.wrenches), *guide]
-    left, _, _ = np.linalg.svd(columns(wrenches, 1.0 / length, 1.0))
+    left, _, _ = np.linalg.svd(_comparable_wrenches(legs, length, guide))
     angular, linear = left[:3, -1] / length, left[3:, -1]
     turning = np.linalg.norm(angular) * length > PURE_TRANSLATION
     size = np.linalg.norm(angular if turning else linear)
@@ -341,17 +348,17 @@ def actuator_jacobian(
     Returns:
         Twists [6 x actuators] at that point: rad and m per rad or m of the actuator.
     """
-    wrenches = [*(wrench for leg in legs for wrench in leg.wrenches), *guide]
+    wrenches = _comparable_wrenches(legs, length, guide)
     rates = []
-    first = 0  # row of the leg's first wrench
+    first = 0  # column of the leg's first wrench
     for leg, leg_springs in zip(legs, springs, strict=True):
         for spring, loads in zip(leg_springs, leg.loads, strict=True):
             if spring.actuated and float(spring.stiffness) > 0.0:
-                rate = np.zeros(len(wrenches))
+                rate = np.zeros(wrenches.shape[1])
                 rate[first : first + len(loads)] = [float(load) for load in loads]
                 rates.append(rate)
         first += len(leg.wrenches)
     if not rates:
         return np.zeros((6, 0))
-    scaled = np.linalg.pinv(columns(wrenches, 1.0 / length, 1.0).T) @ np.array(rates).T
+    scaled = np.linalg.pinv(wrenches.T) @ np.array(rates).T
     return np.asarray(scaled / np.repeat([length, 1.0], 3)[:, None])

@@ -90,6 +90,7 @@ def nearest_home(problems: Problems, unknowns: Array, goal: Coordinates) -> Arra
         nearer = closed & (short | ((end**2).sum(axis=1) < (best[rows] ** 2).sum(axis=1)))
         best[rows[nearer]] = end[nearer]
         share = np.where(nearer, 1.0, SHORTENING * share)
+        # Near the nearest posture the slope falls with its square; one that is not even halved is round-off.
         settled = short & ((slope <= NEAREST_POSTURE) | (slope > 0.5 * slope_before))
         unsettled = ~settled & (share >= SHORTEST_SHARE)
         rows, share, slope_before = rows[unsettled], share[unsettled], slope[unsettled]
@@ -97,7 +98,7 @@ def nearest_home(problems: Problems, unknowns: Array, goal: Coordinates) -> Arra
 
 
 def _surely_held(rates: Array) -> Mask:
-    """Tell where every motion changes a gap, much faster than singular values do; False where this shows nothing.
+    """Tell where every motion changes a gap, in less time than singular values take; False where this shows nothing.
 
     The sum of squares of the inverse of all squared rates is larger than the inverse of the least of them.
     """

@@ -47,13 +47,13 @@ def ways(problems: Problems, goal: Coordinates) -> Iterator[tuple[Plan, Mask]]:
         yield around_the_base, everywhere
         yield about_the_first_axis, everywhere
     start = _start(problems, goal)
-    moves, turns = (_any(goal[name] != start[name] for name in names) & everywhere for names in (POINT, ANGLES))
+    moves, turns = (_where_any(goal[name] != start[name] for name in names) & everywhere for names in (POINT, ANGLES))
     yield turning_last, moves & turns
     yield turning_first, moves & turns
-    yield the_long_way_round, _any(np.abs(goal[name]) > math.pi for name in ANGLES) & everywhere
+    yield the_long_way_round, _where_any(np.abs(goal[name]) > math.pi for name in ANGLES) & everywhere
 
 
-def _any(conditions: Iterable[Any]) -> Mask:
+def _where_any(conditions: Iterable[Any]) -> Mask:
     return np.asarray(reduce(np.logical_or, conditions))
 
 
@@ -88,22 +88,23 @@ def the_long_way_round(problems: Problems, goal: Coordinates) -> Way:
 
 def straight(problems: Problems, goal: Coordinates) -> Way:
     """All coordinates evenly, angles the short way round."""
-    return the_long_way_round(problems, _short(goal))
+    return the_long_way_round(problems, _short_way(goal))
 
 
-def _short(goal: Coordinates) -> Coordinates:
+def _short_way(goal: Coordinates) -> Coordinates:
+    """A goal whose angles are within half a turn of 0."""
     return {name: _part_of_a_turn(value) if name in ANGLES else value for name, value in goal.items()}
 
 
 def turning_last(problems: Problems, goal: Coordinates) -> Way:
     """The point first, then the angles."""
-    start, short = _start(problems, goal), _short(goal)
+    start, short = _start(problems, goal), _short_way(goal)
     return lambda share: _on_the_way(start, short, np.minimum(2.0 * share, 1.0), np.maximum(2.0 * share - 1.0, 0.0))
 
 
 def turning_first(problems: Problems, goal: Coordinates) -> Way:
     """The angles first, then the point."""
-    start, short = _start(problems, goal), _short(goal)
+    start, short = _start(problems, goal), _short_way(goal)
     return lambda share: _on_the_way(start, short, np.maximum(2.0 * share - 1.0, 0.0), np.minimum(2.0 * share, 1.0))
 
 
@@ -131,11 +132,8 @@ def about_the_first_axis(problems: Problems, goal: Coordinates) -> Way:
     """The leg's last joint about the axis of its first one: angle, radius and height evenly."""
     frame = _LegEnds(problems, goal)
     axis = frame.axis
-    parts = []
-    for arm in frame.arms:
-        height = (arm * axis).sum(axis=1)
-        parts.append((height, arm - axis * height[:, None]))
-    (low, near), (high, far) = parts
+    low, high = ((arm * axis).sum(axis=1) for arm in frame.arms)
+    near, far = (arm - axis * height[:, None] for arm, height in zip(frame.arms, (low, high), strict=True))
     sizes = np.linalg.norm(near, axis=1), np.linalg.norm(far, axis=1)
     angle = np.arctan2((np.cross(near, far) * axis).sum(axis=1), (near * far).sum(axis=1))
     outward = near / sizes[0][:, None]
@@ -151,14 +149,22 @@ def about_the_first_axis(problems: Problems, goal: Coordinates) -> Way:
 
 
 class _LegEnds:
-    """The first and the last joint of a leg in each problem, for ways of the last one [problems x 3]."""
+    """The first and the last joint of a leg in each problem, for ways of the last one.
+
+    Attributes:
+        start, goal: coordinates of the platform at the home pose and at the goal, angles the short way round.
+        base: the first joint [problems x 3].
+        offset: from the platform point to the last joint, in the axes of the platform [problems x 3].
+        arms: from the first joint to the last one, at the home pose and at the goal [problems x 3].
+        axis: the axis of the first joint [problems x 3].
+    """
 
     def __init__(self, problems: Problems, goal: Coordinates) -> None:
         (part,) = problems.parts
         joints = [step.element.mover for step in part.build.steps(problems.poses, part.legs[:, 0])]
         pointed = [joint for joint in joints if joint.point is not None]
         count = len(problems.poses)
-        self.start, self.goal = _start(problems, goal), _short(goal)
+        self.start, self.goal = _start(problems, goal), _short_way(goal)
         home_point, goal_point = (
             rows_of(placement_of(columns_of(c)).translation, count) for c in (self.start, self.goal)
         )
@@ -220,7 +226,7 @@ def _leg_beyond(problems: Problems, steps: Sequence[Step], goal: Coordinates) ->
     home = rows_of(placement_of(columns_of(problems.at_home())).translation, count)
     points += [home] if problems.free else []
     end = rows_of(placement_of(columns_of(goal)).apply(vector_of(points[-1] - home)), count)
-    near, far = _distances(first.mover, points[0], end)
+    near, far = _distances_to_path(first.mover, points[0], end)
     links = np.stack([np.linalg.norm(b - a, axis=1) for a, b in pairwise(points)] or [0.0 * near])
     longest = links.sum(axis=0)
     shortest = np.maximum(2.0 * links.max(axis=0) - longest, 0.0)
@@ -236,18 +242,18 @@ def _centres(step: Step) -> tuple[Vector, ...]:
     return (joint.point,) if joint.point is not None and is_zero(joint.pitch) else ()
 
 
-def _distances(joint: Joint, point: Array, end: Array) -> tuple[Array, Array]:
+def _distances_to_path(joint: Joint, point: Array, end: Array) -> tuple[Array, Array]:
     """The least and the greatest distance of ends from where a joint can take a point."""
     axis = rows_of(joint.axis, len(end))
     if joint.point is None:
-        return _about(axis, end - point)[0], np.full(len(end), np.inf)
+        return _radius_and_height(axis, end - point)[0], np.full(len(end), np.inf)
     centre = rows_of(joint.point, len(end))
-    radius, height = _about(axis, point - centre)
-    end_radius, end_height = _about(axis, end - centre)
+    radius, height = _radius_and_height(axis, point - centre)
+    end_radius, end_height = _radius_and_height(axis, end - centre)
     return np.hypot(end_radius - radius, end_height - height), np.hypot(end_radius + radius, end_height - height)
 
 
-def _about(axis: Array, arms: Array) -> tuple[Array, Array]:
+def _radius_and_height(axis: Array, arms: Array) -> tuple[Array, Array]:
     """Radius and height of points about an axis, from their arms to a point of it."""
     height = (arms * axis).sum(axis=1)
     return np.linalg.norm(arms - axis * height[:, None], axis=1), height

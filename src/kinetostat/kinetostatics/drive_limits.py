@@ -88,9 +88,9 @@ def lost_motion(machine: Machine, spring: Spring) -> Scalar:
     friction = drive.guide_friction if slides else drive.bearing_friction
     if not is_zero(friction):
         distance = distance + joint_compliance(machine, spring) * (2.0 * friction)
-    if is_zero(drive.rotor_friction) or not (_is_closed(servo) and is_zero(servo.integral_time)):
+    if is_zero(drive.rotor_friction) or not _is_closed(servo):
         return distance
-    rotor_angle = 2.0 * drive.rotor_friction * _inverse(_loop_stiffness(servo))
+    rotor_angle = 2.0 * drive.rotor_friction * _loop_compliance(servo)
     return distance + rotor_angle * _travel_per_radian(drive, slides)
 
 
@@ -114,11 +114,11 @@ def joint_compliance(machine: Machine, spring: Spring) -> Scalar:
     transmission = reciprocal(spring.stiffness)
     if not _is_closed(servo):
         return transmission
-    loop, compliance = _loop_stiffness(servo), transmission * (1.0 - servo.position_at_load)
+    compliance = transmission * (1.0 - servo.position_at_load)
     travel = _travel_per_radian(drive, spring.joint.point is None)
-    if is_zero(servo.integral_time) and not is_zero(travel):
-        compliance = compliance + travel * travel * _inverse(loop)
-    return where(loop > 0.0, compliance, transmission)
+    if not is_zero(travel):
+        compliance = compliance + travel * travel * _loop_compliance(servo)
+    return where(_loop_stiffness(servo) > 0.0, compliance, transmission)
 
 
 def _tables_of(machine: Machine, spring: Spring) -> tuple[Drives, ServoGains]:
@@ -129,6 +129,14 @@ def _tables_of(machine: Machine, spring: Spring) -> tuple[Drives, ServoGains]:
 def _loop_stiffness(servo: ServoGains) -> Scalar:
     """Torque of the rotor per angle by which it is off its set point at rest, N·m/rad, without an integral part."""
     return servo.velocity_gain * servo.position_gain
+
+
+def _loop_compliance(servo: ServoGains) -> Scalar:
+    """Angle by which the rotor is off its set point at rest per torque, rad/(N·m); 0 where there is an integral part.
+
+    Pose by pose, because an integral time that varies may be 0 at some poses.
+    """
+    return where(servo.integral_time > 0.0, 0.0, _inverse(_loop_stiffness(servo)))
 
 
 def _travel_per_radian(drive: Drives, slides: bool) -> Scalar:

@@ -41,7 +41,7 @@ def why_not(machine: Machine, response: Response, nearby: Sequence[Configuration
         if placed is not Status.OK:
             return _undetermined_pose(machine) if placed is Status.SINGULAR else placed.sentence
     if status is Status.OUT_OF_REACH:
-        return why_out_of_reach(configuration)
+        return why_out_of_reach(configuration, machine.display)
     if status is Status.JOINT_LIMIT:
         return why_beyond(response.checks, machine.display)
     passed = [check for check in response.checks if check.limit.about is not About.LOAD]  # loads have no numbers here

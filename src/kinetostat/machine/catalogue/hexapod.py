@@ -6,8 +6,7 @@ i. Points and axes are in the base frame.
 
 from typing import Annotated
 
-from kinetostat.algebra.scalar import cos, sin
-from kinetostat.algebra.vector import Displacement, Vector, rotation_x, rotation_y, rotation_z
+from kinetostat.algebra.vector import Displacement, Vector, rotation_of_angles
 from kinetostat.machine.leg import RIGID
 from kinetostat.machine.rings import Placement, Rings, joint_angles, leg_ends, with_struts_or_cranks
 from kinetostat.spec.fields import Quantity, table
@@ -55,9 +54,7 @@ def hexapod_platform(geometry: Geometry, _stiffness: Stiffness, pose: Pose) -> P
 
     No pose is out of reach: strokes are limits, which are compared elsewhere.
     """
-    turn = rotation_z(cos(pose.yaw), sin(pose.yaw)) @ rotation_y(cos(pose.pitch), sin(pose.pitch))
-    turn = turn @ rotation_x(cos(pose.roll), sin(pose.roll))
-    platform = Displacement(turn, Vector(pose.x, pose.y, pose.z))
+    platform = Displacement(rotation_of_angles(pose.roll, pose.pitch, pose.yaw), Vector(pose.x, pose.y, pose.z))
     return Placement(
         platform,
         leg_ends(
