@@ -36,8 +36,6 @@ BARS_WIDTH, ROW_HEIGHT, ROOM_FOR_TITLE = 2.4, 0.24, 1.4
 """Width of the panels of bars beside their labels, height of a row, and of title, scale and notes, inches."""
 BAR_HEIGHT = 0.8
 """Height of all bars of a row together, as a share of the distance between rows."""
-BAR_SHARE = 0.92
-"""Height of a bar as a share of its place in a row: a line of white parts it from the next."""
 
 
 def ranked_by(answer: Budget) -> list[str]:
@@ -173,7 +171,11 @@ def _bars(panel: "Axes", title: str, bars: dict[str, list[float]], names: list[s
     for number, (name, colour) in enumerate(zip(names, figures.COLOURS, strict=False)):
         widths = [100.0 * shares[number] for shares in bars.values()]
         panel.barh(
-            places + (number - 0.5 * (len(names) - 1)) * height, widths, BAR_SHARE * height, color=colour, label=name
+            places + (number - 0.5 * (len(names) - 1)) * height,
+            widths,
+            figures.BAR_SHARE * height,
+            color=colour,
+            label=name,
         )
     panel.set_yticks(places, list(bars))
     panel.set_ylim(len(bars) - 0.4, -0.6)

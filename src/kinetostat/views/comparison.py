@@ -7,7 +7,7 @@ import math
 import string
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from rich.text import Text
@@ -56,8 +56,16 @@ PANELS_IN_A_ROW = 4
 """Panels beside each other at most: more would not fit across a page."""
 GROUP_WIDTH = 0.8
 """Width of the bars of all designs together, in distances of groups: groups stay apart."""
-Bars = list[tuple[str, DesignRow, DesignRow | None]]
-"""For each group of bars: its label, the row of the bars, and the row of the dots if there are any."""
+FIRST_COLOUR, DOT_COLOUR, REMARK_COLOUR = "#999999", "#333333", "#666666"
+"""Greys of the first design, with which the others are compared, of dots over bars, and of words instead of bars."""
+
+
+class BarGroup(NamedTuple):
+    """Bars of all designs that stand together: their label, their values, and those of the dots over them, if any."""
+
+    label: str
+    row: DesignRow
+    dots: DesignRow | None = None
 
 
 def letters_of(comparison: Comparison) -> str:
@@ -77,7 +85,7 @@ def _lines(comparison: Comparison) -> Lines:
     yield "Percent", "Percentages are changes against A; the best value of each row is bold."
     if not differing_fields(comparison):
         yield "Files", "The files have equal values."
-    if len(_families(comparison)) > 1:
+    if len({design.machine.family.name for design in comparison.designs}) > 1:
         yield "Files", "Fields that only one design has are omitted."
     if comparison.verdicts:
         yield from (
@@ -123,10 +131,6 @@ def _verdict_table(comparison: Comparison, letters: str) -> FittedTable:
         styled = [Text(cell, "red" if cell.startswith("missed") else "green" if cell != DASH else "") for cell in cells]
         table.add_row(": ".join(condition_of(row)), *styled)
     return table
-
-
-def _families(comparison: Comparison) -> set[str]:
-    return {design.machine.family.name for design in comparison.designs}
 
 
 def differing_fields(comparison: Comparison) -> dict[str, list[str]]:
@@ -176,7 +180,7 @@ def _row_table(
 
 
 def _cell(row: DesignRow, i: int, scale: Scale, digits: int) -> Text:
-    """Return a value and its change against the first design; green where it is better."""
+    """Return the value of the i-th design and its change against the first one; green where it is better."""
     endless = "rigid" if row.better is Better.MORE else "free"
     value, percent = row.values[i], row.percents[i]
     shown = Text(number(value and value * scale.factor, endless, digits), "bold" if i in row.best else "")
@@ -230,9 +234,9 @@ def comparison_figure(comparison: Comparison, title: str = "Designs compared, {}
     Bars start at 0. If the numbers of a panel differ too much for that, its axis is logarithmic, and marks take the
     place of bars, because the length of a bar has no meaning there.
     """
-    panels = [panel for panel in _panels(comparison) if panel[1]]
+    panels = list(_panels(comparison).items())
     lines = [panels[i : i + PANELS_IN_A_ROW] for i in range(0, len(panels), PANELS_IN_A_ROW)]
-    sizes = [[LEAST_PANEL_WIDTH + BAR_GROUP_WIDTH * len(bars) for _, bars in line] for line in lines]
+    sizes = [[LEAST_PANEL_WIDTH + BAR_GROUP_WIDTH * len(groups) for _, groups in line] for line in lines]
     width = max(sum(line) + ROOM_FOR_NUMBERS * (len(line) + 1) for line in sizes)
     height = PANEL_HEIGHT * len(lines) + ROOM_FOR_TITLE + LEGEND_ROW * len(comparison.designs)
     over = f"mean (bars) and worst (dots) {comparison.where}" if comparison.where else "at the pose of each design"
@@ -240,92 +244,97 @@ def comparison_figure(comparison: Comparison, title: str = "Designs compared, {}
         rows = figure.add_gridspec(len(lines), 1)
         for row, (line, widths) in enumerate(zip(lines, sizes, strict=True)):
             cells = rows[row].subgridspec(1, len(line), width_ratios=widths)
-            for column, (name, bars) in enumerate(line):
+            for column, (name, groups) in enumerate(line):
                 panel = figure.add_subplot(cells[column])
-                _draw_bars(panel, name, bars, len(comparison.designs), comparison.machine.display)
-        styles = zip(string.ascii_uppercase, comparison.designs, strict=False)
+                _draw_bars(panel, name, groups, len(comparison.designs), comparison.machine.display)
+        labels = (_short(design.label) for design in comparison.designs)
         handles = [
-            patches.Patch(color=_colour(i), label=f"{letter}  {_short(design.label)}")
-            for i, (letter, design) in enumerate(styles)
+            patches.Patch(color=_colour(i), label=f"{letter}  {label}")
+            for i, (letter, label) in enumerate(zip(letters_of(comparison), labels, strict=True))
         ]
-        frames = dict.fromkeys(frame_of(design.machine) for design in comparison.designs)
-        legend = f"in {' or '.join(frames)}"
-        figure.legend(handles=handles, loc="outside lower left", title=legend, title_fontsize=6.5, alignment="left")
+        frames = " or ".join(dict.fromkeys(frame_of(design.machine) for design in comparison.designs))
+        look: dict[str, Any] = {"title_fontsize": figures.NOTE_SIZE, "alignment": "left"}
+        figure.legend(handles=handles, loc="outside lower left", title=f"in {frames}", **look)
     return figure
 
 
-def _panels(comparison: Comparison) -> list[tuple[str, Bars]]:
-    """Return the panels with their titles; the mass is the last."""
-    mass: Bars = [("", row, None) for row in comparison.rows if row.name == "moving mass"]
-    return [*_by_title(_bars_over_poses(comparison) or _bars_at_pose(comparison)), ("moving mass", mass)]
+def _panels(comparison: Comparison) -> dict[str, list[BarGroup]]:
+    """Return the bars of each panel by its title; the mass is the last."""
+    panels = _by_title(_bars_over_poses(comparison) or _bars_at_pose(comparison))
+    mass = [BarGroup("", row) for row in comparison.rows if row.name == "moving mass"]
+    return panels | {"moving mass": mass} if mass else panels
 
 
-def _bars_over_poses(comparison: Comparison) -> Bars:
+def _bars_over_poses(comparison: Comparison) -> list[BarGroup]:
     """Return the mean of each quantity over the poses with its worst value; nothing if there are no poses."""
-    groups: dict[str, dict[str, DesignRow]] = {}
+    rows: dict[str, dict[str, DesignRow]] = {}
     for row in comparison.over if comparison.where else ():
-        groups.setdefault(row.group, {})[row.name] = row
-    return [(name, group["mean"], group.get("worst") or group["greatest in size"]) for name, group in groups.items()]
+        rows.setdefault(row.group, {})[row.name] = row
+    return [BarGroup(name, of["mean"], of.get("worst") or of["greatest in size"]) for name, of in rows.items()]
 
 
-def _bars_at_pose(comparison: Comparison) -> Bars:
+def _bars_at_pose(comparison: Comparison) -> list[BarGroup]:
     """Return the numbers at the pose: the quantities that were named, or else the usual ones."""
-    named: Bars = [(row.name, row, None) for row in comparison.rows if row.group == "quantities"]
-    usual: Bars = [
-        (row.name, row, None)
+    named = [BarGroup(row.name, row) for row in comparison.rows if row.group == "quantities"]
+    usual = [
+        BarGroup(row.name, row)
         for row in comparison.rows
         if row.group in ("compliance", "loads and vibration") or row.name == "singularity margin"
     ]
     return named or usual
 
 
-def _by_title(pairs: Bars) -> list[tuple[str, Bars]]:
+def _by_title(groups: Sequence[BarGroup]) -> dict[str, list[BarGroup]]:
     """Put bars under the title of their panel: entries of a matrix about and along axes, members of a group together.
 
     A number that stands alone, such as the first frequency, has its whole name in the title.
+
+    Args:
+        groups: the bars, each with the whole name of its quantity as its label.
     """
-    panels: dict[str, Bars] = {}
-    for name, bar, dot in pairs:
+    panels: dict[str, list[BarGroup]] = {}
+    for name, row, dots in groups:
         stem, _, member = name.rpartition("_") if "_" in name else name.rpartition(" ")
         is_member = stem and (member.isdigit() or member in COMPONENTS)
         title, label = (stem.replace("_", " "), member) if is_member else (name.replace("_", " "), "")
         title = "compliance" if title == "C" else title
         if is_member and member in COMPONENTS:
             title = f"{title} {'about' if member.startswith('r') else 'along'} axes"
-        panels.setdefault(title, []).append((label, bar, dot))
-    lone = {title: bars[0][0] for title, bars in panels.items() if len(bars) == 1 and bars[0][0].isdigit()}
-    return [
-        (f"{title} {lone[title]}", [("", *bars[0][1:])]) if title in lone else (title, bars)
-        for title, bars in panels.items()
-    ]
+        panels.setdefault(title, []).append(BarGroup(label, row, dots))
+    titled: dict[str, list[BarGroup]] = {}
+    for title, members in panels.items():
+        lone = members[0].label if len(members) == 1 and members[0].label.isdigit() else ""
+        titled[f"{title} {lone}".rstrip()] = [members[0]._replace(label="")] if lone else members
+    return titled
 
 
-def _draw_bars(panel: "Axes", title: str, bars: Bars, count: int, display: Display) -> None:
-    """Draw a group of bars for each row, a bar for each of so many designs, in the unit that fits all of them."""
-    unit = bars[0][1].unit
-    heights = np.array([_finite_values(bar) for _, bar, _ in bars])
-    dots = np.array([_finite_values(dot) if dot else [math.nan] * count for _, _, dot in bars])
+def _draw_bars(panel: "Axes", title: str, groups: Sequence[BarGroup], count: int, display: Display) -> None:
+    """Draw the groups of bars of a panel, a bar for each of so many designs, in the unit that fits all of them."""
+    unit = groups[0].row.unit
+    heights = np.array([_finite_values(group.row) for group in groups])
+    dots = np.array([_finite_values(group.dots) if group.dots else [math.nan] * count for group in groups])
     scale = display.fitting(unit, [*heights.flat, *dots.flat])
     heights, dots = heights * scale.factor, dots * scale.factor
     logarithmic = _spans_decades(heights)
     width = GROUP_WIDTH / count
-    for i in range(count):
-        places = np.arange(len(bars)) + (i - (count - 1) / 2) * width
+    offsets = (np.arange(count) - (count - 1) / 2) * width  # of the bars of a group from its middle
+    for i, offset in enumerate(offsets):
+        places = np.arange(len(groups)) + offset
         if logarithmic:
             panel.plot(places, heights[:, i], "D", color=_colour(i), markersize=5.0)
         else:
-            panel.bar(places, heights[:, i], width * 0.92, color=_colour(i))
-        panel.plot(places, dots[:, i], "o", color="#333333", markersize=2.5)
-        for place, (_, row, _) in zip(places, bars, strict=True):
-            _say_missing(panel, float(place), row, i)
-    panel.set_xlim(-0.5, len(bars) - 0.5)
+            panel.bar(places, heights[:, i], width * figures.BAR_SHARE, color=_colour(i))
+        panel.plot(places, dots[:, i], "o", color=DOT_COLOUR, markersize=2.5)
+        for place, group in zip(places, groups, strict=True):
+            _write_missing(panel, float(place), group.row, i)
+    panel.set_xlim(-0.5, len(groups) - 0.5)
     if logarithmic:
         panel.set_yscale("log")
         panel.margins(y=0.15)
-    if len(bars) == 1 and not bars[0][0]:  # there is room for the letter of each design below its bar
-        panel.set_xticks((np.arange(count) - (count - 1) / 2) * width, [*string.ascii_uppercase[:count]])
+    if len(groups) == 1 and not groups[0].label:  # there is room for the letter of each design below its bar
+        panel.set_xticks(offsets, [*string.ascii_uppercase[:count]])
     else:
-        panel.set_xticks(range(len(bars)), [label for label, _, _ in bars])
+        panel.set_xticks(range(len(groups)), [group.label for group in groups])
     panel.grid(visible=False, axis="x")
     panel.set_axisbelow(True)
     panel.tick_params(axis="x", length=0)
@@ -338,14 +347,14 @@ def _spans_decades(heights: Array) -> bool:
     return bool(positive.size) and bool(positive.max() > WIDEST_LINEAR_RATIO * positive.min())
 
 
-def _say_missing(panel: "Axes", place: float, row: DesignRow, i: int) -> None:
+def _write_missing(panel: "Axes", place: float, row: DesignRow, i: int) -> None:
     """Write why a design has no bar: its mass is not known, it lacks the direction, or it is free there."""
     value = row.values[i]
     if value is None or not math.isfinite(value):
         absent = "not known" if row.unit == "kg" else "none"
         text = absent if value is None or math.isnan(value) else "infinite"
-        transform = panel.get_xaxis_transform()
-        panel.text(place, 0.02, text, transform=transform, rotation=90, ha="center", fontsize=6.5, color="#666666")
+        look: dict[str, Any] = {"rotation": 90, "ha": "center", "fontsize": figures.NOTE_SIZE, "color": REMARK_COLOUR}
+        panel.text(place, 0.02, text, transform=panel.get_xaxis_transform(), **look)
 
 
 def _finite_values(row: DesignRow) -> list[float]:
@@ -353,7 +362,7 @@ def _finite_values(row: DesignRow) -> list[float]:
 
 
 def _colour(i: int) -> str:
-    return ("#999999", *figures.COLOURS)[i % (len(figures.COLOURS) + 1)]
+    return (FIRST_COLOUR, *figures.COLOURS)[i % (len(figures.COLOURS) + 1)]
 
 
 def _short(label: str) -> str:
@@ -392,16 +401,11 @@ def _differences(comparison: Comparison) -> dict[str, list[Any]]:
 def _numbers(rows: Sequence[DesignRow]) -> list[dict[str, Any]]:
     return [
         {
-            "group": row.group,
-            "name": row.name,
-            "units": row.unit,
-            "better": row.better,
-            "values": row.values,
-            "percent": row.percents,
-            "best": row.best,
+            "group": row.group, "name": row.name, "units": row.unit, "better": row.better,
+            "values": row.values, "percent": row.percents, "best": row.best,
         }
         for row in rows
-    ]
+    ]  # fmt: skip
 
 
 def _verdicts(comparison: Comparison) -> list[dict[str, Any]]:
@@ -420,14 +424,9 @@ def _verdicts(comparison: Comparison) -> list[dict[str, Any]]:
 
 
 def _grid(comparison: Comparison) -> dict[str, Any] | None:
-    if not comparison.where:
-        return None
-    return {
-        "over": comparison.ranges,
-        "poses": comparison.where,
-        "designs": [{"answered": answered, "poses": poses} for answered, poses in comparison.poses],
-        "rows": _numbers(comparison.over),
-    }
+    designs = [{"answered": answered, "poses": poses} for answered, poses in comparison.poses]
+    over = {"over": comparison.ranges, "poses": comparison.where}
+    return {**over, "designs": designs, "rows": _numbers(comparison.over)} if comparison.where else None
 
 
 COMPARISON = Description(

@@ -1,21 +1,32 @@
-"""Drawing of a machine at its pose: front, side and plan, to scale. Geometry comes from the configuration alone."""
+"""Drawings of machines by lines: front, side and plan to scale, and a machine that has moved over the one at its pose.
+
+Geometry comes from the configuration alone.
+"""
 
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import TypeAlias
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
-from kinetostat.algebra.vector import Vector
+from kinetostat.algebra.vector import Displacement, Vector
+from kinetostat.display import with_minus_signs
 from kinetostat.equilibrium.state import state_of
+from kinetostat.frozen import dataclass
+from kinetostat.kinetostatics.loading import Deflection
+from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.leg import Leg
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.tolerances import SAME_TO_THE_EYE
-from kinetostat.views.figures import COLOURS, STYLE, Drawings, set_title
+from kinetostat.views.figures import COLOURS, NOTE_COLOUR, NOTE_SIZE, STYLE, Drawings, set_title
 from kinetostat.views.layout import fix_layout
+from kinetostat.views.scene.anatomy import proportions_of
+from kinetostat.views.scene.overlays import exaggerated_displacement, exaggeration_of
 
 THREE_VIEWS = (("front", "x", "z"), ("side", "y", "z"), ("plan", "x", "y"))
 """Names of the views, each with the axes across and up."""
@@ -25,7 +36,16 @@ MOST_TICKS = 4
 """Intervals of an axis at most: views are for shapes, and half of the time of drawing one goes into its numbers."""
 MILLIMETRES = 1e3
 """Millimetres of a metre: views are labelled in mm whatever units the file displays."""
-LEG_COLOUR, CONSTRAINT_COLOUR, PLATE_COLOUR = COLOURS[0], COLOURS[1], "#555555"
+LEG_COLOUR, CONSTRAINT_COLOUR = COLOURS[0], COLOURS[1]
+"""Colours of actuated and of passive legs: blue and orange, as in pictures."""
+PLATE_COLOUR, PLATE_FILL = "#555555", "#dddddd"
+"""Greys of the edge and of the face of a plate: legs are seen over them."""
+THREE_VIEWS_WIDTH, ONE_VIEW_WIDTH, VIEWS_HEIGHT = 7.6, 4.0, 3.3
+"""Width of a figure of three views and of one, and its height, inches."""
+MOVED_COLOUR, SLACK_COLOUR, UNMOVED_COLOUR = COLOURS[0], COLOURS[1], "#9a9a9a"
+"""Colours of a machine that has moved, of its slack legs, and of the machine at its pose behind it."""
+PIECES_OF_LINK = 12
+"""Straight pieces of which a bent link is drawn: its corners cannot be seen in a view of a few centimetres."""
 CYLINDER_SHARE = 0.55
 """Share of the first link of an actuated leg that is drawn thick, as the cylinder of a telescope."""
 NEIGHBOUR_SHARE = 0.3
@@ -38,7 +58,9 @@ side to a corner."""
 OFFSETS = {"P": (4, 4), "T": (4, -10)}
 """Shift of the letters of reference points, in points: both can be read where the points coincide in a view."""
 
-Points = list[Vector]
+Points: TypeAlias = list[Vector]
+Projection: TypeAlias = Callable[[Points], tuple[list[float], list[float]]]
+"""Gives the coordinates of points in a picture, across and up."""
 
 
 def three_views(machine: Machine, title: str) -> Figure:
@@ -65,7 +87,8 @@ def views_of(configuration: Configuration, draw: Callable[[Axes, str, str], None
         draw: fills a panel, given the axes across and up.
     """
     views = THREE_VIEWS if configuration.plane is None else THREE_VIEWS[2:]
-    figure = Figure(figsize=(7.6 if len(views) > 1 else 4.0, 3.3), layout="constrained")
+    width = THREE_VIEWS_WIDTH if len(views) > 1 else ONE_VIEW_WIDTH
+    figure = Figure(figsize=(width, VIEWS_HEIGHT), layout="constrained")
     panels = dict(zip(views, figure.subplots(1, len(views), squeeze=False).flat, strict=True))
     ends: dict[str, list[float]] = {}
     for (name, across, up), panel in panels.items():
@@ -90,7 +113,7 @@ def _draw_view(configuration: Configuration, tool: Vector, panel: Axes, across: 
     actuated = [leg for leg in configuration.legs if leg.actuated]
     spanning = [leg for leg in actuated if len(leg.path) > 1]
     for plate in (ring_of([leg.path[0] for leg in spanning]), ring_of([leg.path[-1] for leg in spanning])):
-        panel.fill(*flat(plate, across, up), facecolor="#dddddd", edgecolor=PLATE_COLOUR, linewidth=0.8, alpha=0.8)
+        panel.fill(*flat(plate, across, up), facecolor=PLATE_FILL, edgecolor=PLATE_COLOUR, linewidth=0.8, alpha=0.8)
     for leg in configuration.legs:
         _draw_leg(panel, leg, across, up, leg in actuated)
     if up == "y":
@@ -168,6 +191,80 @@ def ring_of(points: Points) -> Points:
 def flat(points: Points, across: str, up: str) -> tuple[list[float], list[float]]:
     """Return the coordinates of points along two axes, mm."""
     return [MILLIMETRES * getattr(p, across) for p in points], [MILLIMETRES * getattr(p, up) for p in points]
+
+
+@dataclass(frozen=True)
+class MotionOverlay:
+    """A machine that has moved, in blue over the machine at its pose in grey.
+
+    Attributes:
+        configuration: the machine at its pose.
+        motions: small motions of tool and links from that pose.
+        factor: the factor by which they are exaggerated.
+        point: the tool point at the pose, base frame, m.
+        displacement: the exaggerated motion of the platform.
+        slack_legs: the names of the legs whose links are dashed.
+    """
+
+    configuration: Configuration
+    motions: Deflection
+    factor: float
+    point: Vector
+    displacement: Displacement
+    slack_legs: Sequence[str]
+
+    def draw(self, panel: Axes, project: Projection) -> None:
+        """Draw both machines in a panel: legs, platform, tool point."""
+        legs = self.configuration.legs
+        heads = ring_of([leg.path[-1] for leg in legs if leg.actuated and leg.path])
+        moved_heads = [self.displacement.apply(head) for head in heads]
+        for leg in legs:
+            panel.plot(*project(list(leg.path)), color=UNMOVED_COLOUR, linewidth=1.6, solid_capstyle="round")
+        for points, colour in ((heads, UNMOVED_COLOUR), (moved_heads, MOVED_COLOUR)):
+            panel.fill(*project(points), facecolor=colour, alpha=0.25, edgecolor=colour, linewidth=0.8)
+        for link in self.motions.links:
+            points_of_link = [link.point(i / PIECES_OF_LINK, self.factor) for i in range(PIECES_OF_LINK + 1)]
+            is_slack = link.leg in self.slack_legs
+            dash, width, colour = ("--", 0.9, SLACK_COLOUR) if is_slack else ("-", 1.6, MOVED_COLOUR)
+            panel.plot(*project(points_of_link), dash, color=colour, linewidth=width)
+        for tip, colour in ((self.point, UNMOVED_COLOUR), (self.displacement.apply(self.point), MOVED_COLOUR)):
+            panel.plot(*project([tip]), "+", color=colour, markersize=7, markeredgewidth=1.2)
+
+
+def motion_overlay(
+    machine: Machine, response: Response, motions: Deflection, slack_legs: Sequence[str] = ()
+) -> MotionOverlay:
+    """Return a machine that has moved over the machine at its pose, with motions as large as can be seen.
+
+    Args:
+        machine: the machine at its pose.
+        response: the response of the machine there.
+        motions: motions of tool and links from that pose.
+        slack_legs: the names of the legs whose links are dashed.
+    """
+    configuration = response.configuration
+    factor = exaggeration_of(machine, configuration, motions, proportions_of(machine, configuration).diagonal)
+    point = machine.tool_point(configuration.platform)
+    displacement = exaggerated_displacement(motions.motion, point, factor)
+    return MotionOverlay(configuration, motions, factor, point, displacement, slack_legs)
+
+
+def add_overlay_legend(figure: Figure, names: tuple[str, str], setting: str, slack: bool = False) -> None:
+    """Name the grey and the blue machine of a figure below it, and the setting for which it holds.
+
+    Args:
+        figure: the figure of a machine that has moved.
+        names: words for the machine at its pose, and for the moved one.
+        setting: lines on where the machine is, and how much larger its motions are drawn.
+        slack: whether dashed legs are explained as well.
+    """
+    styles = [(names[0], UNMOVED_COLOUR, "-"), (names[1], MOVED_COLOUR, "-")]
+    styles += [("slack", SLACK_COLOUR, "--")] if slack else []
+    legend = figure.legend(
+        handles=[Line2D([], [], color=colour, linestyle=dash, label=text) for text, colour, dash in styles],
+        loc="outside lower center", ncols=len(styles), title_fontsize=NOTE_SIZE, title=with_minus_signs(setting),
+    )  # fmt: skip
+    legend.get_title().set(multialignment="center", color=NOTE_COLOUR)
 
 
 def machine_figures(machine: Machine) -> Drawings:

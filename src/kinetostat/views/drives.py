@@ -1,9 +1,13 @@
-"""Drives along a motion: the question, the description of its answer, and its figures."""
+"""Drives along a motion: the question, the description of its answer, and its figures.
 
-from collections.abc import Callable, Iterator, Mapping
+Only energies are added up here; the answer is computed in `studies.drives`.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -15,7 +19,7 @@ from kinetostat.late import LateModule
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import find_field
 from kinetostat.motion.forces import PARTS
-from kinetostat.studies.drives import DriveLoad, DriveLoads, drives
+from kinetostat.studies.drives import DriveCurves, DriveLoad, DriveLoads, drives
 from kinetostat.studies.motion_deflection import ModesAlong
 from kinetostat.studies.requirements import motor_requirements
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
@@ -37,6 +41,12 @@ MOST_MODES = 6
 """Excited modes that are named: the lowest ones move the tool most."""
 FIGURE_WIDTH, PANEL_HEIGHT, ROOM_FOR_TITLE = 6.6, 1.7, 0.9
 """Width of a figure over time, height of each of its panels, and of title and notes, inches."""
+HEIGHT_OF_PARTS = 3.2
+"""Height of the figure of the parts of one force, whose curves cross each other, inches."""
+ZERO_COLOUR = "#b0b0b0"
+"""Grey of the line at zero, paler than the curves that cross it."""
+CURVE_WIDTH, WHOLE_WIDTH = 1.1, 1.4
+"""Widths of the curve of a drive or of a part of its force, and of that of the whole force, points."""
 
 
 def _lines(answer: DriveLoads) -> Lines:
@@ -45,20 +55,14 @@ def _lines(answer: DriveLoads) -> Lines:
         return
     point, name = answer.worst
     if answer.motion.timeless:
-        speed, acceleration = (
-            _direction(part, point) for part in (answer.motion.path.rates, answer.motion.path.accelerations)
-        )
+        path = answer.motion.path
+        speed, acceleration = (_components_at(point, rows) for rows in (path.rates, path.accelerations))
         yield "Worst way", f"{name} does most at the speed {speed} m/s with the acceleration {acceleration} m/s²."
         return
     if names := ", ".join(answer.motion.loads):
         yield "Loads", f"The motion says {names}, in the place of what the file has there."
-    yield "Worst pose", f"{name} does most at {answer.motion.times[point]:.4g} s: {_pose(answer, point)}."
-    net = sum(drive.energy.net for drive in answer.drives)
-    braking = sum(drive.energy.braking for drive in answer.drives)
-    gross = max(net + braking, 0.0)
-    net = net if abs(net) > ROUND_OFF_OF_ENTRY * gross else 0.0
-    text = f"All motors together give {number(gross)} J, and take back {number(braking)} J while they brake"
-    yield "Energy", f"{text}: {number(net)} J net."
+    yield "Worst pose", f"{name} does most at {answer.motion.times[point]:.4g} s: {_pose_text(answer, point)}."
+    yield "Energy", _energy_sentence(answer)
     if answer.greatest_deflection is not None:
         size, place = answer.greatest_deflection
         shown, moment = answer.machine.display.show_deflection(size, "m"), f"{answer.motion.times[place]:.4g} s"
@@ -66,9 +70,19 @@ def _lines(answer: DriveLoads) -> Lines:
         yield "Deflection", text
     if answer.along_modes is not None:
         yield "Vibration", _modes_text(answer, answer.along_modes)
-    if any(drive.turns == 1.0 and drive.slides for drive in answer.drives):
+    if any(drive.slides and not drive.rotary for drive in answer.drives):  # the motor of a drive with a lead turns
         lead = f'lead = "{answer.machine.display.show(0.01, "m")}"'
         yield "Motors", f"The file gives no lead, so that motors are taken for linear ones; write {lead} in [drives]."
+
+
+def _energy_sentence(answer: DriveLoads) -> str:
+    """Say what all motors give and take back in the whole motion; a net energy that is round-off is 0."""
+    net = sum(drive.energy.net for drive in answer.drives)
+    braking = sum(drive.energy.braking for drive in answer.drives)
+    gross = max(net + braking, 0.0)
+    net = net if abs(net) > ROUND_OFF_OF_ENTRY * gross else 0.0
+    text = f"All motors together give {number(gross)} J, and take back {number(braking)} J while they brake"
+    return f"{text}: {number(net)} J net."
 
 
 def _modes_text(answer: DriveLoads, along: ModesAlong) -> str:
@@ -87,11 +101,12 @@ def _modes_text(answer: DriveLoads, along: ModesAlong) -> str:
     return f"{text}, and after the end it swings by up to {show(along.after, 'm')}." if along.after else f"{text}."
 
 
-def _direction(part: Mapping[str, Array], point: int) -> str:
-    return ", ".join(f"{name} {number(float(rows[point]))}" for name, rows in part.items() if name in POINT)
+def _components_at(point: int, rows: Mapping[str, Array]) -> str:
+    """Return the components of a speed or an acceleration of the platform point, SI, at a point of the motion."""
+    return ", ".join(f"{name} {number(float(row[point]))}" for name, row in rows.items() if name in POINT)
 
 
-def _pose(answer: DriveLoads, point: int) -> str:
+def _pose_text(answer: DriveLoads, point: int) -> str:
     show = answer.machine.display.show
     units = {name: find_field(answer.machine.family, f"pose.{name}").unit for name in answer.motion.path.pose}
     return ", ".join(
@@ -114,12 +129,11 @@ def _drive_table(answer: DriveLoads) -> FittedTable:
     heads = ["from", "to", "speed", "acceleration", "force", "RMS"]
     table = numeric_table("Drives: greatest values", "drive", heads)
     for drive in answer.drives:
-        length = motion_unit(not drive.slides)
-        scale = display.scale(length)
-        ends = [display.show(end, length) for end in drive.coordinate]
-        rates = [
-            f"{number(v * scale.factor)} {scale.unit}/s{s}" for v, s in ((drive.speed, ""), (drive.acceleration, "²"))
-        ]
+        unit = motion_unit(not drive.slides)
+        scale = display.scale(unit)
+        ends = [display.show(end, unit) for end in drive.coordinate]
+        speed, acceleration = (number(size * scale.factor) for size in (drive.speed, drive.acceleration))
+        rates = [f"{speed} {scale.unit}/s", f"{acceleration} {scale.unit}/s²"]
         forces = [display.show(force, drive.unit) for force in (drive.force, drive.rms_force)]
         table.add_row(drive.name, *ends, *rates, *forces)
     return table
@@ -166,52 +180,59 @@ def _motor_speed(drive: DriveLoad) -> str:
 
 def over_time_figure(answer: DriveLoads, title: str = "{}: drives along the motion") -> "Figure":
     """Draw speed, force and power of all drives over time."""
-    curves, display = curves_of(answer), answer.machine.display
-    rows: list[tuple[Array, str, list[bool]]] = []
-    for turning, kind in ((False, "force"), (True, "torque")):
-        chosen = [drive.slides is not turning for drive in answer.drives]
-        if any(chosen):
-            scale, force = display.scale(motion_unit(turning)), display.scale(load_unit(turning))
-            rows.append((curves.speed * scale.factor, f"speed ({scale.unit}/s)", chosen))
-            rows.append((curves.force * force.factor, force.label(kind), chosen))
-    rows.append((curves.power, "power of motors (W)", [True] * len(answer.drives)))
+    contents = list(_contents_over_time(answer, curves_of(answer)))
     with figures.new_figure(
-        (FIGURE_WIDTH, ROOM_FOR_TITLE + PANEL_HEIGHT * len(rows)), title.format(answer.machine.name)
+        (FIGURE_WIDTH, ROOM_FOR_TITLE + PANEL_HEIGHT * len(contents)), title.format(answer.machine.name)
     ) as figure:
-        panels = list(figure.subplots(len(rows), 1, sharex=True, squeeze=False).flat)
-        for panel, (values, label, chosen) in zip(panels, rows, strict=True):
-            _lines_over_time(panel, answer, values, chosen)
-            panel.set_ylabel(label)
+        panels = list(figure.subplots(len(contents), 1, sharex=True, squeeze=False).flat)
+        for panel, content in zip(panels, contents, strict=True):
+            _draw_over_time(panel, answer, content)
         panels[-1].set_xlabel("time (s)")
         name_drives(figure, answer)
         note_motion(figure, answer)
     return figure
 
 
-def _lines_over_time(panel: "Axes", answer: DriveLoads, values: Array, chosen: list[bool]) -> None:
-    """Draw values [drives x n] of the chosen drives over time; colours that come again are dashed."""
-    panel.axhline(0.0, color="#b0b0b0", linewidth=0.8)
-    for k, drive in enumerate(answer.drives):
-        if chosen[k]:
-            dash = "--" if k >= len(figures.COLOURS) else "-"
-            look: dict[str, Any] = {"color": figures.colour_of(k), "linewidth": 1.1, "label": drive.name}
-            panel.plot(answer.motion.times, values[k], dash, **look)
+class ContentOverTime(NamedTuple):
+    """A panel over time: its label, the places of the drives that it shows, and their values [places x n]."""
+
+    label: str
+    places: Sequence[int]
+    values: Array
+
+
+def _contents_over_time(answer: DriveLoads, curves: DriveCurves) -> Iterator[ContentOverTime]:
+    """Give the panels of a figure over time: speed and force of linear and of rotary drives, and the power of all."""
+    display = answer.machine.display
+    for turning, kind in ((False, "force"), (True, "torque")):
+        if chosen := [k for k, drive in enumerate(answer.drives) if drive.slides is not turning]:
+            motion, load = display.scale(motion_unit(turning)), display.scale(load_unit(turning))
+            yield ContentOverTime(f"speed ({motion.unit}/s)", chosen, curves.speed[chosen] * motion.factor)
+            yield ContentOverTime(load.label(kind), chosen, curves.force[chosen] * load.factor)
+    yield ContentOverTime("power of motors (W)", range(len(answer.drives)), curves.power)
+
+
+def _draw_over_time(panel: "Axes", answer: DriveLoads, content: ContentOverTime) -> None:
+    """Draw the values of some drives over time; colours that come again are dashed."""
+    panel.axhline(0.0, color=ZERO_COLOUR, linewidth=0.8)
+    for k, values in zip(content.places, content.values, strict=True):
+        dash = "--" if k >= len(figures.COLOURS) else "-"
+        look: dict[str, Any] = {"color": figures.colour_of(k), "linewidth": CURVE_WIDTH, "label": answer.drives[k].name}
+        panel.plot(answer.motion.times, values, dash, **look)
+    panel.set_ylabel(content.label)
 
 
 def parts_figure(answer: DriveLoads, name: str, title: str = "{}: parts of the force of {}") -> "Figure":
     """Draw the parts of the force of the drive of that name, and the whole force, over time."""
-    curves, display = curves_of(answer), answer.machine.display
+    curves, times = curves_of(answer), answer.motion.times
     k = [drive.name for drive in answer.drives].index(name)
-    scale = display.scale(answer.drives[k].unit)
-    with figures.new_figure((FIGURE_WIDTH, 3.2), title.format(answer.machine.name, name)) as figure:
+    scale = answer.machine.display.scale(answer.drives[k].unit)
+    with figures.new_figure((FIGURE_WIDTH, HEIGHT_OF_PARTS), title.format(answer.machine.name, name)) as figure:
         panel = figure.add_subplot()
-        times = answer.motion.times
-        for i, part in enumerate(PARTS):
-            if np.any(curves.parts[k, i]):
-                panel.plot(
-                    times, curves.parts[k, i] * scale.factor, color=figures.COLOURS[i], linewidth=1.1, label=part
-                )
-        panel.plot(times, curves.force[k] * scale.factor, color="black", linewidth=1.4, label="whole")
+        for colour, part, force in zip(figures.COLOURS, PARTS, curves.parts[k], strict=False):
+            if np.any(force):
+                panel.plot(times, force * scale.factor, color=colour, linewidth=CURVE_WIDTH, label=part)
+        panel.plot(times, curves.force[k] * scale.factor, color="black", linewidth=WHOLE_WIDTH, label="whole")
         panel.set_xlabel("time (s)")
         panel.set_ylabel(scale.label("force" if answer.drives[k].slides else "torque"))
         panel.legend(frameon=False, fontsize="small", ncols=3)
@@ -240,23 +261,23 @@ def curves_csv(answer: DriveLoads) -> str | None:
     columns |= answer.motion.path.pose
     columns |= {f"{name} [{load['units']}]": load["values"] for name, load in answer.motion.loads.items()}
     for k, drive in enumerate(answer.drives):
-        length = motion_unit(not drive.slides)
-        rows_of = (
-            ("coordinate", length, curves.coordinate),
-            ("speed", f"{length}/s", curves.speed),
-            ("acceleration", f"{length}/s**2", curves.acceleration),
+        unit = motion_unit(not drive.slides)
+        values_of_all = (
+            ("coordinate", unit, curves.coordinate),
+            ("speed", f"{unit}/s", curves.speed),
+            ("acceleration", f"{unit}/s**2", curves.acceleration),
             ("force", drive.unit, curves.force),
             ("motor torque", drive.motor_unit, curves.motor_torque),
             ("power", "W", curves.power),
             ("net energy", "J", curves.net_energy),
         )
-        columns |= {f"{drive.name} {name} [{unit}]": part[k] for name, unit, part in rows_of}
+        columns |= {f"{drive.name} {name} [{of_values}]": values[k] for name, of_values, values in values_of_all}
     return columns_csv(columns)
 
 
-def _of_modes(name: str) -> Callable[[DriveLoads], Any]:
-    """Return a number of the modes along the motion; None where they are not known."""
-    return lambda answer: getattr(answer.along_modes, name, None)
+def _of_modes(number_of: Callable[[ModesAlong], Any]) -> Callable[[DriveLoads], Any]:
+    """Return a function that gives a number of the modes along the motion; None where they are not known."""
+    return lambda answer: None if answer.along_modes is None else number_of(answer.along_modes)
 
 
 def _loads_over_time(answer: DriveLoads) -> Array:
@@ -267,10 +288,11 @@ def _loads_over_time(answer: DriveLoads) -> Array:
 
 
 def _over_time(name: str, unit: str, meaning: str) -> Field:
-    """Return a curve of all drives; empty where there is no answer."""
+    """Return the field of a curve of all drives, an attribute of `DriveCurves`; it is empty without an answer."""
+    values_of = attrgetter(f"curves.{name}")
 
     def take(answer: DriveLoads) -> Array:
-        return np.zeros((0, 0)) if answer.curves is None else np.asarray(getattr(answer.curves, name))
+        return np.zeros((0, 0)) if answer.curves is None else np.asarray(values_of(answer))
 
     return Field(f"{name}_over_time", take, unit, meaning, ("drive", "time"))
 
@@ -297,10 +319,22 @@ DRIVES = Description(
         ),
         Field("worst_time", lambda a: None if a.worst is None else float(a.motion.times[a.worst.point]), "s"),
         Field("worst_drive", lambda a: None if a.worst is None else a.worst.drive),
-        Field("frequency", _of_modes("frequency"), "Hz", "lowest natural frequency with motors that stand still"),
-        Field("excited_modes", _of_modes("modes"), "Hz", "natural frequencies that the motion excites"),
+        Field(
+            "frequency",
+            _of_modes(lambda modes: modes.frequency),
+            "Hz",
+            "lowest natural frequency with motors that stand still",
+        ),
+        Field(
+            "excited_modes", _of_modes(lambda modes: modes.modes), "Hz", "natural frequencies that the motion excites"
+        ),
         Field("deflection_with_modes", lambda a: a.greatest_with_modes and a.greatest_with_modes[0], "m"),
-        Field("deflection_after", _of_modes("after"), "m", "greatest swing of the tool point after the end"),
+        Field(
+            "deflection_after",
+            _of_modes(lambda modes: modes.after),
+            "m",
+            "greatest swing of the tool point after the end",
+        ),
         Field("requirements", lambda a: a.requirements or None, optional=True),
         Field("greatest_deflection", lambda a: a.greatest_deflection and a.greatest_deflection[0], "m"),
         Records(
@@ -354,7 +388,7 @@ DRIVES = Description(
             "deflection",
             lambda a: np.zeros((0, 6)) if a.deflection is None else a.deflection,
             "",
-            "of the tool point, rad and m",
+            "deflection of the tool point at rest under the forces of the motion: rotation, rad, and displacement, m",
             ("time", "component"),
         ),
     ),

@@ -289,7 +289,9 @@ def _draw_panel(panel: "Axes", answer: Elevation, content: PanelContent, angle_f
         panel.set_ylim(0.0, ROOM_ABOVE_CURVE * float(np.nanmax(curves[""])) * scale.factor)
     else:
         # Six drives are six curves all over the panel: a legend inside would cover some of them.
-        panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=6.5, borderaxespad=0.2)
+        panel.legend(
+            loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=figures.NOTE_SIZE, borderaxespad=0.2
+        )
 
 
 ELEVATION = Description(

@@ -61,12 +61,16 @@ METRES_PER_INCH = 0.0254
 """Metres of an inch: PNG states its resolution in pixels per metre."""
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito: distinct for colour-blind readers and in grey."""
+NOTE_COLOUR, NOTE_SIZE, TITLE_SIZE = "#555555", 6.5, 10
+"""Grey and size of the notes below a figure, and size of its title, points; long legends are as small as notes."""
+BAR_SHARE = 0.92
+"""Width of a bar as a share of its place beside others: a line of white parts it from the next."""
 NO_RESULT_COLOUR = "#eeeeee"
 """Pale grey of poses without a result."""
 DASHES: tuple[Any, ...] = ("-", "--", ":", "-.", (0, (5, 1)), (0, (1, 1)))
 """Dashes of curves, which tell them apart without colours."""
 NOTE_CHARACTERS_PER_INCH, TITLE_CHARACTERS_PER_INCH = 19, 12
-"""Characters of the notes below a figure and of its title that fit into an inch, at 6.5 and 10 points."""
+"""Characters of the notes below a figure and of its title that fit into an inch, at the sizes of both."""
 MOST_COLUMNS = 3
 """Panels side by side, as a rule at most: with more, a figure would be wider than a page."""
 PAGE_MARGIN = 0.04
@@ -209,14 +213,14 @@ def set_title(figure: Figure, title: str) -> None:
     """Write the title over a figure, in as many lines as its width asks for."""
     lines = textwrap.wrap(title, int(TITLE_CHARACTERS_PER_INCH * figure.get_figwidth()))
     # Names from files stand in titles: two dollar signs in one are no mathematics.
-    figure.suptitle("\n".join(lines), fontsize=10, parse_math=False)
+    figure.suptitle("\n".join(lines), fontsize=TITLE_SIZE, parse_math=False)
 
 
 def note_setting(figure: Figure, *lines: str) -> None:
     """Write small lines below a figure, wrapped to its width: where its numbers hold, and what is missing."""
     room = int(NOTE_CHARACTERS_PER_INCH * figure.get_figwidth())
     shown = [with_minus_signs(part) for line in lines if line for part in textwrap.wrap(line, room)]
-    figure.supxlabel("\n".join(shown), fontsize=6.5, color="#555555")
+    figure.supxlabel("\n".join(shown), fontsize=NOTE_SIZE, color=NOTE_COLOUR)
 
 
 def missing_line(counts: Mapping[Status, int], poses: int, shown: str = "") -> str:
@@ -257,5 +261,5 @@ def fill_regions(panel: Axes, x: Array, y: Array, places: Any, has_result: Any, 
 def slim_bar(bar: Colorbar) -> None:
     """Give a colour bar thin lines, small numbers, and ticks at its numbers alone."""
     bar.outline.set_linewidth(0.4)
-    bar.ax.tick_params(labelsize=6.5, width=0.4)
+    bar.ax.tick_params(labelsize=NOTE_SIZE, width=0.4)
     bar.minorticks_off()

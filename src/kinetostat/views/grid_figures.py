@@ -24,6 +24,7 @@ from kinetostat.studies.result_file import thinned_dataset
 from kinetostat.studies.stored_grid import StoredGrid
 from kinetostat.views.figures import (
     NO_RESULT_COLOUR,
+    NOTE_SIZE,
     STYLE,
     fill_regions,
     grid_shape,
@@ -279,5 +280,5 @@ def carrying_map(carrying: "Carrying", title: str) -> Figure:
         patches = [Patch(color=colour, label=name) for colour, name in zip(colours, named, strict=False)]
         patches += [Patch(color=NO_RESULT_COLOUR, label="no result")] if (codes < 0).any() else []
         setting = "\n".join(line for line in setting_lines(dataset) if line)
-        figure.legend(handles=patches, loc="outside lower center", ncols=1, title=setting, title_fontsize=6.5)
+        figure.legend(handles=patches, loc="outside lower center", ncols=1, title=setting, title_fontsize=NOTE_SIZE)
     return figure

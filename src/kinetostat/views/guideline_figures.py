@@ -14,7 +14,7 @@ from kinetostat.kinetostatics.elements import Element
 from kinetostat.machine.machine import setting_of
 from kinetostat.machine.parameters import with_leg
 from kinetostat.studies.guidelines import EXCESS_OF_RIGID, Guidelines, stiffening
-from kinetostat.views.figures import COLOURS, DASHES, GUIDE_COLOUR, grid_shape, new_figure, panel_grid
+from kinetostat.views.figures import COLOURS, DASHES, GUIDE_COLOUR, NOTE_SIZE, grid_shape, new_figure, panel_grid
 from kinetostat.views.guidelines import unit_of_limits
 from kinetostat.views.question import Drawing
 from kinetostat.views.sensitivity import coloured_table
@@ -30,6 +30,8 @@ PANEL_SIZE = (2.9, 2.5)
 """Width and height of the panel of an element with its labels, inches."""
 ROOM_BESIDE_PANELS = (0.9, 0.7)
 """Further width, of the legend, and height, of title and notes, inches."""
+NOW_COLOURS = ("#888888", "#666666")
+"""Greys of the line at the present stiffness, and of the word beside it."""
 TOP_OF_PANEL, HEIGHT_OF_NOW = 104.0, 3.0
 """Upper end of a panel, above 100 % so that a curve that levels out is seen; and height of the word at the present
 stiffness; in percent."""
@@ -107,8 +109,8 @@ def _draw_curves(panel: Axes, answer: Guidelines, element: Element, limits: Arra
         if 0.0 < limit < math.inf:
             panel.plot(present * limit, 100.0 / (1.0 + EXCESS_OF_RIGID), "o", color=colour, markersize=4, zorder=3)
     if not rigid_now:
-        panel.axvline(present, color="#888888", linewidth=0.8, linestyle=":")
-        panel.text(present, HEIGHT_OF_NOW, " now", fontsize=6.5, color="#666666", ha="left")
+        panel.axvline(present, color=NOW_COLOURS[0], linewidth=0.8, linestyle=":")
+        panel.text(present, HEIGHT_OF_NOW, " now", fontsize=NOTE_SIZE, color=NOW_COLOURS[1], ha="left")
     unit = scale.label("stiffness") if element.stiffness is not None else "multiple of the present stiffness"
     panel.set(xscale="log", ylim=(0.0, TOP_OF_PANEL), xlabel=unit, ylabel="stiffness, % of that with\na rigid element")
     panel.set_title(element.name, parse_math=False)

@@ -6,20 +6,17 @@ the curve while the load grows. Nothing is computed here.
 
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kinetostat.algebra.scalar import reciprocal
-from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
-from kinetostat.display import DASH, Scale, number, with_minus_signs
-from kinetostat.kinetostatics.loading import Deflection
-from kinetostat.kinetostatics.response import Response
+from kinetostat.display import DASH, Scale, number
 from kinetostat.late import LateModule
-from kinetostat.machine.machine import Machine, setting_of
+from kinetostat.machine.machine import setting_of
 from kinetostat.studies.under_load import LoadedState, SpringState, load_curve
 from kinetostat.units import component_units, load_unit, motion_unit
 from kinetostat.views.analysis_tables import entry_unit, softest_sentence, stiffness_sentence
@@ -28,19 +25,16 @@ from kinetostat.views.tables import FittedTable, numeric_table
 
 if TYPE_CHECKING:
     import matplotlib as mpl
-    from matplotlib import lines
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from kinetostat.views import drawing, figures, layout
-    from kinetostat.views.scene import anatomy, overlays
+    from kinetostat.views.scene import overlays
 else:
     mpl = LateModule("matplotlib")
-    lines = LateModule("matplotlib.lines")
     drawing = LateModule("kinetostat.views.drawing")
     figures = LateModule("kinetostat.views.figures")
     layout = LateModule("kinetostat.views.layout")
-    anatomy = LateModule("kinetostat.views.scene.anatomy")
     overlays = LateModule("kinetostat.views.scene.overlays")
 
 KINDS_OF_LOADS = ((False, "force"), (True, "moment"))
@@ -53,23 +47,21 @@ SIGNS = (
     "or flexure it is positive along the axis that the file gives, so that mirrored copies of a leg differ in sign."
 )
 """Meaning of the signs of loads, which stands beside their tables."""
-UNLOADED_COLOUR = "#9a9a9a"
-"""Colour of the machine without its loads, behind the loaded one."""
 CURVES_WIDTH, CURVES_HEIGHT, ROOM_FOR_TITLE = 6.6, 1.8, 0.7
 """Width of the figure of a growing load, with the legends to the right of its panels; height of each panel; and room
 for title and labels, inches."""
 BARS_WIDTH, ROOM_FOR_SCALE = 4.6, 0.6
 """Width of the panels of bars beside the names of legs, and height of the labels below each panel, inches."""
-BAR_HEIGHT = 0.24
-"""Height of the figure for each bar, inches: names of legs stand line by line beside them."""
+BAR_HEIGHT, BAR_SHARE = 0.24, 0.6
+"""Height of the figure for each bar, inches: names of legs stand line by line; and the share of it that a bar takes."""
+ROOM_BESIDE_BARS = 0.15
+"""Room beyond the ends of bars for their numbers, as a share of the range of the bars."""
+FULL_LOAD_COLOUR = "#999999"
+"""Grey of the line at the whole load."""
 LEAST_NAME_WIDTH = 2.0
 """Least room for the names of legs, inches: figures of different machines then begin alike."""
-PIECES_OF_LINK = 12
-"""Straight pieces of which a bent link is drawn: its corners cannot be seen in a view of a few centimetres."""
 MOST_CURVES = 12
 """Springs of which a curve is drawn, those with the greatest loads: more cannot be told apart."""
-Projection: TypeAlias = Callable[[list[Vector]], tuple[list[float], list[float]]]
-"""Gives the coordinates of points in a picture, across and up."""
 
 
 def stability_of(state: LoadedState) -> str:
@@ -279,70 +271,18 @@ def load_figure(state: LoadedState, title: str = "{}: under growing load") -> "F
 def shape_figure(state: LoadedState, title: str = "{}: under load") -> "Figure":
     """Draw the loaded machine over the unloaded one, in front, side and plan; slack legs are dashed."""
     machine, response = state.machine, state.state.free
-    motions, named = overlays.motions_of(state, response), ("without loads", "at rest under load")
-    draw, factor = overlay_of_motion(machine, response, motions, state.slack_legs)
+    names = ("without loads", "at rest under load")
+    overlay = drawing.motion_overlay(machine, response, overlays.motions_of(state, response), state.slack_legs)
     with mpl.rc_context(figures.STYLE):
         figure = drawing.views_of(
             response.configuration,
-            lambda panel, across, up: draw(panel, lambda points: drawing.flat(points, across, up)),
+            lambda panel, across, up: overlay.draw(panel, lambda points: drawing.flat(points, across, up)),
         )
-        legend_of_overlay(figure, named, f"{setting_of(machine, [])}\n{drawn_larger(factor)}", bool(state.slack_legs))
+        setting = f"{setting_of(machine, [])}\n{drawn_larger(overlay.factor)}"
+        drawing.add_overlay_legend(figure, names, setting, bool(state.slack_legs))
         figures.set_title(figure, title.format(machine.name))
         layout.fix_layout(figure)
     return figure
-
-
-def overlay_of_motion(
-    machine: Machine, response: Response, motions: Deflection, slack_legs: Sequence[str] = ()
-) -> tuple[Callable[["Axes", Projection], None], float]:
-    """Return a function that draws a moved machine over the machine at its pose, and the factor of exaggeration.
-
-    Args:
-        machine: the machine at its pose.
-        response: the response of the machine there.
-        motions: motions of tool and links from that pose.
-        slack_legs: the names of the legs whose links are dashed.
-    """
-    configuration, (moved_colour, slack_colour) = response.configuration, figures.COLOURS[:2]
-    diagonal = anatomy.proportions_of(machine, configuration).diagonal
-    factor = overlays.exaggeration_of(machine, configuration, motions, diagonal)
-    point = machine.tool_point(configuration.platform)
-    motion = overlays.exaggerated_displacement(motions.motion, point, factor)
-    heads = drawing.ring_of([leg.path[-1] for leg in configuration.legs if leg.actuated and leg.path])
-
-    def draw(panel: "Axes", project: Projection) -> None:
-        for leg in configuration.legs:
-            panel.plot(*project(list(leg.path)), color=UNLOADED_COLOUR, linewidth=1.6, solid_capstyle="round")
-        for points, colour in ((heads, UNLOADED_COLOUR), ([motion.apply(head) for head in heads], moved_colour)):
-            panel.fill(*project(points), facecolor=colour, alpha=0.25, edgecolor=colour, linewidth=0.8)
-        for link in motions.links:
-            points_of_link = [link.point(i / PIECES_OF_LINK, factor) for i in range(PIECES_OF_LINK + 1)]
-            slack = link.leg in slack_legs
-            dash, width = ("--", 0.9) if slack else ("-", 1.6)
-            panel.plot(*project(points_of_link), dash, color=slack_colour if slack else moved_colour, linewidth=width)
-        for tip, colour in ((point, UNLOADED_COLOUR), (motion.apply(point), moved_colour)):
-            panel.plot(*project([tip]), "+", color=colour, markersize=7, markeredgewidth=1.2)
-
-    return draw, factor
-
-
-def legend_of_overlay(figure: "Figure", named: tuple[str, str], setting: str, slack: bool = False) -> None:
-    """Name the grey and the blue machine of a figure below it, and the setting for which it holds.
-
-    Args:
-        figure: the figure of a moved machine.
-        named: words for the machine at its pose, and for the moved one.
-        setting: lines on where the machine is, and how much larger its motions are drawn.
-        slack: whether dashed legs are explained as well.
-    """
-    moved_colour, slack_colour = figures.COLOURS[:2]
-    styles: list[tuple[str, str, Any]] = [(named[0], UNLOADED_COLOUR, "-"), (named[1], moved_colour, "-")]
-    styles += [("slack", slack_colour, "--")] if slack else []
-    legend = figure.legend(
-        handles=[lines.Line2D([], [], color=colour, linestyle=dash, label=text) for text, colour, dash in styles],
-        loc="outside lower center", ncols=len(styles), title_fontsize=6.5, title=with_minus_signs(setting),
-    )  # fmt: skip
-    legend.get_title().set(multialignment="center", color="#555555")
 
 
 def bars_figure(state: LoadedState) -> "Figure":
@@ -361,7 +301,7 @@ def bars_figure(state: LoadedState) -> "Figure":
             scale, places = display.scale(load_unit(turns)), range(len(group))
             loads = [spring.load * scale.factor for _, spring in group]
             colours = [figures.COLOURS[0 if load > 0.0 else 1] for load in loads]
-            panel.barh(places, loads, height=0.6, color=colours)
+            panel.barh(places, loads, height=BAR_SHARE, color=colours)
             for place, load, (_, spring) in zip(places, loads, group, strict=True):
                 text = "slack" if spring.slack else number(load, digits=display.digits)
                 panel.annotate(
@@ -371,7 +311,7 @@ def bars_figure(state: LoadedState) -> "Figure":
             panel.set_yticks(places, [name for name, _ in group])
             panel.axvline(0.0, color=figures.GUIDE_COLOUR, linewidth=0.8)
             panel.set_xlabel(scale.label("load, positive where it pulls"))
-            panel.margins(x=0.15)
+            panel.margins(x=ROOM_BESIDE_BARS)
             panel.set_axisbelow(True)
             panel.invert_yaxis()
     return figure
@@ -385,7 +325,7 @@ def drawn_larger(factor: float) -> str:
 def _curves(panel: "Axes", share: Array, curves: dict[str, Array], label: str) -> None:
     for place, (name, values) in enumerate(curves.items()):
         panel.plot(share, values, label=name, **figures.look_of(place))
-    panel.axvline(100.0, color="#999999", linewidth=0.8)
+    panel.axvline(100.0, color=FULL_LOAD_COLOUR, linewidth=0.8)
     panel.set_ylabel(label)
     panel.margins(x=0.0)
     panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))

@@ -15,7 +15,7 @@ from kinetostat.studies.optimisation.assessment import COMMON_SHARE, Scatter
 from kinetostat.studies.optimisation.log import Log
 from kinetostat.studies.optimisation.problem import Objective
 from kinetostat.studies.optimisation.result import Result
-from kinetostat.views.figures import COLOURS, GUIDE_COLOUR, grid_shape, new_figure, panel_grid
+from kinetostat.views.figures import COLOURS, GUIDE_COLOUR, NOTE_SIZE, grid_shape, new_figure, panel_grid
 from kinetostat.views.question import Drawing
 
 HISTOGRAM_WIDTH = 3.6
@@ -209,7 +209,7 @@ def _histogram(panel: Axes, scatter: Scatter, display: Display) -> None:
     panel.set(xlabel=scale.label(scatter.label), ylabel="machines")
     panel.margins(x=0.03)
     panel.set_ylim(top=panel.get_ylim()[1] * ROOM_ABOVE_HISTOGRAM)
-    panel.legend(loc="upper left", fontsize=6.5, frameon=True, framealpha=1.0, edgecolor="none")
+    panel.legend(loc="upper left", fontsize=NOTE_SIZE, frameon=True, framealpha=1.0, edgecolor="none")
 
 
 def _axis(objective: Objective, scale: Scale) -> str:

@@ -251,7 +251,7 @@ def measured_figure(answer: "MeasuredComparison", title: str = "{}: measured and
         for panel in (left, right):
             panel.grid(visible=False, axis="y")
             panel.tick_params(axis="y", length=0)
-        right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=6.5, borderaxespad=0.2)
+        right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=figures.NOTE_SIZE, borderaxespad=0.2)
     return figure
 
 

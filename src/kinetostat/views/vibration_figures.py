@@ -15,9 +15,8 @@ from kinetostat.display import Scale
 from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Configuration, Machine, setting_of
 from kinetostat.studies.vibration import DRAWN_MODES, Vibration, frequency_range
-from kinetostat.views.drawing import Points
+from kinetostat.views.drawing import Points, add_overlay_legend, motion_overlay
 from kinetostat.views.figures import COLOURS, DASHES, GUIDE_COLOUR, STYLE, grid_shape, new_figure
-from kinetostat.views.loaded import legend_of_overlay, overlay_of_motion
 from kinetostat.views.question import Drawing
 from kinetostat.views.rendering.camera import VIEWPOINTS, axes_towards
 from kinetostat.views.scene.anatomy import proportions_of
@@ -154,7 +153,7 @@ def shapes_figure(answer: Vibration, title: str = "{}: shapes of modes") -> Figu
         for number, mode, shape in shown:
             row, column = divmod(number - shown[0][0], columns)
             place = (column * view.width, -row * view.height)
-            overlay_of_motion(machine, response, shape)[0](panel, partial(view.project, place=place))
+            motion_overlay(machine, response, shape).draw(panel, partial(view.project, place=place))
             heading = f"{number}: {machine.display.show(mode.frequency, 'Hz')} (tool: {mode.direction})"
             panel.annotate(heading, view.heading(place), ha="center", va="bottom", size=STYLE["axes.titlesize"])
         _draw_axes(panel, view, axis, "xy" if planar else "xyz")
@@ -162,7 +161,7 @@ def shapes_figure(answer: Vibration, title: str = "{}: shapes of modes") -> Figu
         panel.set(xlim=(left, left + columns * view.width), ylim=(top - rows * view.height, top))
         panel.set_axis_off()
         setting = f"{setting_of(machine, [])}; axes as long as {machine.display.show(axis, 'm')}\n{ANY_SIZE}"
-        legend_of_overlay(figure, ("at rest", "in the mode"), setting)
+        add_overlay_legend(figure, ("at rest", "in the mode"), setting)
     return figure
 
 

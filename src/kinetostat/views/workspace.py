@@ -248,7 +248,7 @@ def _sections(cuts: Sequence[xr.Dataset], answer: Workspace, title: str, along: 
         frame = cuts[0].attrs.get("frame", "") if conditions else ""
         figure.legend(
             handles=[*_patches(cuts, labels), *_border_legend(conditions, borders)],
-            loc="outside lower center", ncols=min(3, 1 + columns), title=frame, title_fontsize=6.5,
+            loc="outside lower center", ncols=min(3, 1 + columns), title=frame, title_fontsize=figures.NOTE_SIZE,
         )  # fmt: skip
     return figure
 
