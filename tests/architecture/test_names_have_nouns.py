@@ -41,7 +41,6 @@ CLASSES_LEFT: frozenset[str] = frozenset(
         "Body",
         "Element",
         "Field",
-        "Kind",
         "Modes",
         "Pace",
         "Picture",

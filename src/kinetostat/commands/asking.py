@@ -195,7 +195,7 @@ def show_answer(options: argparse.Namespace, answer: Any, to_files: bool = False
     """
     from kinetostat.views.answers import description_of
     from kinetostat.views.data_forms import json_of
-    from kinetostat.views.tables import tell
+    from kinetostat.views.tables import print_answer
 
     description, output = description_of(answer), getattr(options, "output", None)
     answered, message = description.answered(answer), getattr(answer, "message", "")
@@ -208,7 +208,7 @@ def show_answer(options: argparse.Namespace, answer: Any, to_files: bool = False
         options,
         answered,
         lambda: json_of(description, answer),
-        lambda console: tell(console, description, answer, full),
+        lambda console: print_answer(console, description, answer, full),
         written,
         message=message,
     )

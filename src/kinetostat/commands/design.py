@@ -150,7 +150,7 @@ def _validate(options: argparse.Namespace) -> int:
     from kinetostat.tolerances import AGREED
     from kinetostat.validation.comparison import validate
     from kinetostat.views.data_forms import json_of
-    from kinetostat.views.tables import tell
+    from kinetostat.views.tables import print_answer
     from kinetostat.views.validation import VALIDATION
 
     poses = [[f"pose.{setting}" for setting in pose] for pose in options.poses or [[]]]
@@ -167,7 +167,7 @@ def _validate(options: argparse.Namespace) -> int:
 
     def show(console: "Console") -> None:
         for validation in validations:
-            tell(console, VALIDATION, validation, full=True)
+            print_answer(console, VALIDATION, validation, full=True)
 
     agreed = all(validation.difference <= AGREED for validation in validations)
     return print_result(options, agreed, lambda: [json_of(VALIDATION, validation) for validation in validations], show)
@@ -265,7 +265,7 @@ def _show(options: argparse.Namespace, result: "Result", changed: "Sequence[str]
     """
     from kinetostat.views.data_forms import json_of
     from kinetostat.views.optimisation import RESULT, write_result
-    from kinetostat.views.tables import tell
+    from kinetostat.views.tables import print_answer
 
     result = result.in_units(options.units) if options.units else result
     written = []
@@ -281,6 +281,6 @@ def _show(options: argparse.Namespace, result: "Result", changed: "Sequence[str]
         return {key: data.get(key) for key in keys} if keys else data
 
     code = print_result(
-        options, result.solved, as_data, lambda console: tell(console, RESULT, result), written, result.message
+        options, result.solved, as_data, lambda console: print_answer(console, RESULT, result), written, result.message
     )
     return judge_requirements(result.machine, printing=not options.json) if result.solved else code

@@ -4,9 +4,9 @@ Nothing is computed here.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
-from functools import partial
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
@@ -36,9 +36,6 @@ else:
     requirements = LateModule("kinetostat.studies.requirements")
     under_load = LateModule("kinetostat.studies.under_load")
     loaded = LateModule("kinetostat.views.loaded")
-
-INDICES = ("principal_compliances", "principal_stiffnesses", "stiffness_condition", "centres", "eigenscrews")
-"""Keys of the indices in JSON: the first is always there, the others where they have a value."""
 
 
 def analyze_in_state(
@@ -133,31 +130,31 @@ def _platform(analysis: Analysis) -> dict[str, Any]:
     return {"position": position, "rotation": rotation}
 
 
-def _indices_json(indices: Indices) -> dict[str, Any]:
-    """The indices as plain data, for the JSON of an analysis."""
-    compliances = (indices.principal_compliances or {}).items()
-    stiffnesses = {"free": indices.free or {}, "guided": indices.guided or {}}
+def _principal_compliances(indices: Indices) -> dict[str, Any] | None:
+    """Return the principal compliances of each block with their directions; None where there are none."""
+    blocks = (indices.principal_compliances or {}).items()
+    return {block: {"values": c.compliances, "directions": c.directions} for block, c in blocks} or None
+
+
+def _principal_stiffnesses(indices: Indices) -> dict[str, Any]:
+    """Return the principal stiffnesses of each block, the other motions free or guided, with their directions."""
+    blocks_by_kind = {"free": indices.free or {}, "guided": indices.guided or {}}
     return {
-        "principal_compliances": {
-            block: {"values": c.compliances, "directions": c.directions} for block, c in compliances
-        }
-        or None,
-        "principal_stiffnesses": {
-            kind: {block: {"values": k.stiffnesses, "directions": k.directions} for block, k in blocks.items()}
-            for kind, blocks in stiffnesses.items()
-        },
-        "stiffness_condition": indices.stiffness_condition,
-        "centres": indices.centres,
-        "eigenscrews": indices.eigenscrews,
+        kind: {block: {"values": k.stiffnesses, "directions": k.directions} for block, k in blocks.items()}
+        for kind, blocks in blocks_by_kind.items()
     }
 
 
-def _index(key: str, analysis: Analysis) -> Any:
-    """Return one of the indices: None where there are none, NaN (null in JSON) where this one has no value."""
-    if analysis.indices is None:
-        return None
-    value = _indices_json(analysis.indices)[key]
-    return math.nan if value is None else value
+def _index_field(key: str, index_of: Callable[[Indices], Any], optional: bool = True) -> Field:
+    """Return a field of one of the indices: None where there are none, NaN (null in JSON) where it has no value."""
+
+    def take(analysis: Analysis) -> Any:
+        if analysis.indices is None:
+            return None
+        value = index_of(analysis.indices)
+        return math.nan if value is None else value
+
+    return Field(key, take, optional=optional)
 
 
 def _mobility(mobility: Mobility | None) -> dict[str, Any] | None:
@@ -217,8 +214,11 @@ ANALYSIS = Description(
         Field("wrench_condition"),
         Field("jacobian_condition"),
         Field("characteristic_length"),
-        Field(INDICES[0], partial(_index, INDICES[0])),
-        *(Field(key, partial(_index, key), optional=True) for key in INDICES[1:]),
+        _index_field("principal_compliances", _principal_compliances, optional=False),
+        _index_field("principal_stiffnesses", _principal_stiffnesses),
+        _index_field("stiffness_condition", attrgetter("stiffness_condition")),
+        _index_field("centres", attrgetter("centres")),
+        _index_field("eigenscrews", attrgetter("eigenscrews")),
         Field("softest"),
         Field("along", "directions"),
         Field("requirements", lambda analysis: analysis.requirements or None, optional=True),

@@ -30,6 +30,7 @@ BLOCKS = (("translation", "along", "N/m"), ("rotation", "about", "N·m/rad"))
 MATRIX_UNITS = {"stiffness": ("N·m/rad", "N/rad", "N/m"), "compliance": ("rad/(N·m)", "rad/N", "m/N")}
 """SI units of the blocks of K and C: rotation, coupling, translation."""
 ROTATION_NAMES = COMPONENTS[:3]
+"""Names of the components that are rotations or moments: rx, ry, rz."""
 MOST_NAMED = 4
 """Parts of unknown mass that are named at most, on one line."""
 
@@ -171,7 +172,9 @@ def matrix_table(
 
 def entry_unit(kind: str, row: str, column: str) -> str:
     """Return the SI unit of an entry of K or C by its block."""
-    return MATRIX_UNITS[kind][(row not in ROTATION_NAMES) + (column not in ROTATION_NAMES)]
+    rotation, coupling, translation = MATRIX_UNITS[kind]
+    turns = [name in ROTATION_NAMES for name in (row, column)]
+    return rotation if all(turns) else coupling if any(turns) else translation
 
 
 def shares_table(analysis: Analysis, full: bool = False) -> FittedTable:
@@ -198,7 +201,7 @@ def principal_table(analysis: Analysis) -> FittedTable:
         ("moment, point held", guided, "rotation", "N·m/rad"),
     ):
         if block in blocks:
-            table.add_row(name, *_ellipsoid(blocks[block], unit, display))
+            table.add_row(name, *_end_cells(blocks[block], unit, display))
     return table
 
 
@@ -214,15 +217,15 @@ def along_table(along: Sequence[DirectionalStiffness], display: Display = ENGINE
     return table
 
 
-def _ellipsoid(block: PrincipalStiffness, unit: str, display: Display) -> list[str]:
+def _end_cells(block: PrincipalStiffness, unit: str, display: Display) -> list[str]:
     """Return the least and the largest stiffness and their directions; a block of one stiffness has two empty cells."""
     ends = block.stiffnesses[0], block.stiffnesses[-1]
     values = [display.number(stiffness, unit, "rigid") for stiffness in ends]
-    directions = [_directions(block, stiffness) for stiffness in ends]
+    directions = [_directions_text(block, stiffness) for stiffness in ends]
     return [*values, *directions] if len(block.stiffnesses) > 1 else [values[0], "", directions[0], ""]
 
 
-def _directions(block: PrincipalStiffness, stiffness: float) -> str:
+def _directions_text(block: PrincipalStiffness, stiffness: float) -> str:
     """Return the direction of a principal stiffness; where several are alike, all that have it."""
     alike: list[Sequence[float]] = []
     others: list[Sequence[float]] = []

@@ -27,7 +27,7 @@ else:
 
 
 @dataclass(frozen=True)
-class Kind:
+class ResultKind:
     """Results of one kind and the description by which they are shown; a machine has no description.
 
     Attributes:
@@ -43,10 +43,10 @@ class Kind:
         """Name of the class."""
         return self.type.rpartition(".")[2]
 
-    def tell(self, console: "Console", answer: object) -> None:
+    def print_to(self, console: "Console", answer: object) -> None:
         """Print a result of this kind."""
         if self.description:
-            late("views.tables.tell")(console, late(self.description), answer)
+            late("views.tables.print_answer")(console, late(self.description), answer)
         else:
             late("views.tables.print_machine")(console, answer)
 
@@ -58,8 +58,10 @@ class Kind:
         return drawings
 
 
-KINDS = (Kind("machine.machine.Machine"), *(Kind(name, place) for name, place in ANSWERS.items()))
+RESULT_KINDS = (ResultKind("machine.machine.Machine"), *(ResultKind(name, place) for name, place in ANSWERS.items()))
 """All kinds of results that Python and notebooks show."""
+GRID_TYPE = "xarray.Dataset"
+"""Class of the answers over a grid, which are told from datasets of other programs by their variable "status"."""
 FILES_OF_A_MACHINE = {
     ".toml": "machine.saving.as_file",
     ".png": "views.picture.machine_picture",
@@ -78,22 +80,22 @@ def description_of(answer: object) -> Description:
     return description
 
 
-def _is(answer: object, path: str) -> bool:
+def _is_instance(answer: object, path: str) -> bool:
     """Return whether an object is of a class; its module has been imported if there is an object of it."""
     module, _, name = path.rpartition(".")
     home = sys.modules.get(f"kinetostat.{module}") or sys.modules.get(module)
     return home is not None and isinstance(answer, getattr(home, name))
 
 
-def kind_of(answer: object) -> Kind:
+def kind_of(answer: object) -> ResultKind:
     """Look up how a result is shown.
 
     Raises:
         InputError: it is not a result of kinetostat.
     """
-    kind_of_answer = next((kind for kind in KINDS if _is(answer, kind.type)), None)
-    if kind_of_answer is None or (kind_of_answer.name == "Dataset" and "status" not in answer):  # type: ignore[operator]
-        kinds = ", ".join(kind.name for kind in KINDS)
+    kind_of_answer = next((kind for kind in RESULT_KINDS if _is_instance(answer, kind.type)), None)
+    if kind_of_answer is None or (kind_of_answer.type == GRID_TYPE and "status" not in answer):  # type: ignore[operator]
+        kinds = ", ".join(kind.name for kind in RESULT_KINDS)
         raise InputError(
             f"An object of type {type(answer).__name__} is not a result of kinetostat; give one of: {kinds}."
         )
@@ -154,9 +156,9 @@ def save(what: object, path: str | Path) -> Path:
 
 def _writers(what: object) -> dict[str, Writer]:
     """Return the ways to write it, by suffix."""
-    if _is(what, "matplotlib.figure.Figure"):
+    if _is_instance(what, "matplotlib.figure.Figure"):
         return dict.fromkeys(FIGURE_SUFFIXES, partial(late("views.figures.save_figure"), what))
-    if _is(what, "views.picture.Picture"):
+    if _is_instance(what, "views.picture.Picture"):
         return {".png": partial(write_content, what)}
     if not kind_of(what).description:
         files = FILES_OF_A_MACHINE.items()

@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from kinetostat.accuracy.errors import MachineError
 from kinetostat.accuracy.toleranced_parts import PossibleErrors, is_about, possible_errors
 from kinetostat.accuracy.tool_error import ExactSample
+from kinetostat.arrays import Array
 from kinetostat.display import Display, number
 from kinetostat.engine.batch import Progress, silent
 from kinetostat.kinematics.status import Status
@@ -213,9 +215,9 @@ def _new_tolerance(answer: Budget, line: str, factor: float) -> str:
     return ", ".join(texts)
 
 
-def _by_measure(answer: Budget, table: Any) -> dict[str, Any]:
+def _by_measure(answer: Budget, statistic: Array) -> dict[str, Any]:
     """Return a statistic [poses x measures] by measure: a number at a single pose, else a list."""
-    columns = dict(zip(answer.measures, table.T, strict=True))
+    columns = dict(zip(answer.measures, statistic.T, strict=True))
     return {name: float(column[0]) if len(column) == 1 else column for name, column in columns.items()}
 
 
@@ -223,8 +225,8 @@ def _exact_of(answer: Budget) -> dict[str, Any] | None:
     exact = answer.exact
     if exact is None:
         return None
-    tables = {name: getattr(exact, name) for name in ("rms", "usual", "difference", "unexplained")}
-    by_measure = {name: dict(zip(answer.measures, table.tolist(), strict=True)) for name, table in tables.items()}
+    sizes = {"rms": exact.rms, "usual": exact.usual, "difference": exact.difference, "unexplained": exact.unexplained}
+    by_measure = {name: dict(zip(answer.measures, row.tolist(), strict=True)) for name, row in sizes.items()}
     return {"machines": exact.machines, "failed": exact.failed, **by_measure}
 
 
@@ -293,7 +295,7 @@ def _errors_table(answer: PossibleErrors, _full: bool) -> Iterator[FittedTable]:
     yield table
 
 
-def _line_about(answer: PossibleErrors, error: Any) -> str | None:
+def _line_about(answer: PossibleErrors, error: MachineError) -> str | None:
     """Return the last line of [tolerances] about a number, which replaces those before it; None if none is."""
     lines = [line for line in answer.machine.tolerances.values() if is_about(line.about, error) and line.of(error.kind)]
     return f"{lines[-1].about}: {lines[-1].text}" if lines else None
@@ -316,7 +318,7 @@ POSSIBLE_ERRORS = Description(
 )
 
 
-def _ask(
+def budget_or_possible_errors(
     machine: Machine,
     poses: Any = None,
     ranges: Sequence[str] = (),
@@ -329,7 +331,7 @@ def _ask(
     list_errors: bool = False,
     progress: Progress = silent,
 ) -> Budget | PossibleErrors:
-    """Answer the command, whose tolerances are in the machine."""
+    """Compute the budget, or only list the numbers that may be off; tolerances of the command are in the machine."""
     if list_errors:
         return possible_errors(machine)
     return budget(
@@ -348,7 +350,7 @@ def _ask(
 
 BUDGET_QUESTION = Question(
     example='kinetostat budget hexapod --tolerance "joints=0.05 mm" --tolerance "zeros=0.02 mm" -o out',
-    answer=_ask,
+    answer=budget_or_possible_errors,
     options=(
         Option(
             "poses",

@@ -1,6 +1,6 @@
-"""Forces and speeds that the drives allow at a pose: the question, the description of its answer, and its figures.
+"""Forces, speeds and accelerations that the drives allow at a pose: the question, its answer in words, and its figures.
 
-A figure shows cuts of the sets of forces and speeds, with their largest circles. Source: theory (81)-(84).
+A figure shows cuts of their sets, with the largest circle in each. Source: theory (81)-(84).
 """
 
 import math
@@ -18,6 +18,7 @@ from kinetostat.numerics.polytopes import outline
 from kinetostat.studies.capability import Capability, CapabilitySet, capability
 from kinetostat.tolerances import DEPENDENT
 from kinetostat.views.analysis_tables import direction_words
+from kinetostat.views.data_forms import finite_or_none
 from kinetostat.views.question import (
     FIRST_FIELDS,
     LOADS_LEFT_OUT,
@@ -51,13 +52,17 @@ TITLES = {
 }
 """Heads of the rows of the table and of the panels of the figure, by set."""
 NO_END = "no limit"
-"""Words for a load that no drive feels."""
+"""Words for a load that no drive feels, and for a speed or an acceleration that nothing limits."""
 MOST_NAMED_DRIVES = 3
 """Drives that a sentence names one by one: more names would hide what it says of them."""
 OPEN_SET_REACH = 3.0
 """Half the width of a panel in units of the least amount, where a set has no end: one sees that it goes on."""
 PANEL_WIDTH_RATIO = 1.12
 """Width of a panel over that of what it shows: a line at its edge would be taken for the frame."""
+OUTLINE_REACH = 2.0
+"""Reach of the outline of a set in reaches of its panel: an open side is cut off where it is not seen."""
+PANEL_SIZE, ROOM_BESIDE_PANELS = (2.3, 2.25), (0.5, 0.9)
+"""Width and height of a panel with its labels; further width, and height of title and notes; inches."""
 MOVING, TURNING = ("force", "speed", "acceleration"), ("moment", "rate", "angular acceleration")
 """Sets that share a figure: those of motions along a direction, and those about one."""
 FIGURES = {"capability": MOVING, "capability_turning": TURNING}
@@ -74,17 +79,16 @@ def _amount_text(answer: Capability, value: float, unit: str) -> str:
 def _weakest(answer: Capability) -> str:
     """Say in which direction the least force and the least speed are, and which drives are at their limits there."""
     sentences = []
-    for name in ("force", "speed", "acceleration"):
-        part = answer.set_of(name)
-        if part and part.weakest.size and part.least > 0.0:
-            sentences.append(
-                f"The {name} is least along {direction_words(part.weakest)}, where {_names(part.limited_by)} reach"
-                f"{'es its limit' if len(part.limited_by) == 1 else ' their limits'}."
-            )
+    for name in MOVING:
+        region = answer.set_of(name)
+        if region and region.weakest.size and region.least > 0.0:
+            reach = "reaches its limit" if len(region.limited_by) == 1 else "reach their limits"
+            where = f"{direction_words(region.weakest)}, where {_list_of(region.limited_by)} {reach}"
+            sentences.append(f"The {name} is least along {where}.")
     return " ".join(sentences)
 
 
-def _names(names: tuple[str, ...]) -> str:
+def _list_of(names: tuple[str, ...]) -> str:
     """List names of drives in a phrase; of many, the first one and the number of the others."""
     if len(names) > MOST_NAMED_DRIVES:
         return f"{names[0]} and {len(names) - 1} others"
@@ -92,12 +96,15 @@ def _names(names: tuple[str, ...]) -> str:
 
 
 def _along(answer: Capability) -> str:
-    """Return the greatest amounts both ways of the direction that was asked for; one where both are the same."""
+    """Return the greatest amounts both ways of the direction that was asked for; one where both are the same.
+
+    Sets that do not hold zero are left out: the drives do not carry what counts already.
+    """
     phrases = []
-    for part in (part for part in answer.sets if part.least >= 0.0):
-        amounts = [part.along([sign * c for c in answer.direction]) for sign in (1.0, -1.0)]
-        shown = list(dict.fromkeys(_amount_text(answer, way, part.unit) for way in amounts))
-        phrases.append(f"{part.name} {' and, the other way, '.join(shown)}")
+    for region in (region for region in answer.sets if region.least >= 0.0):
+        amounts = [region.along([sign * c for c in answer.direction]) for sign in (1.0, -1.0)]
+        shown = list(dict.fromkeys(_amount_text(answer, amount, region.unit) for amount in amounts))
+        phrases.append(f"{region.name} {' and, the other way, '.join(shown)}")
     return f"Along or about {direction_words(answer.direction)}: {'; '.join(phrases)}." if phrases else ""
 
 
@@ -113,10 +120,10 @@ def _tables(answer: Capability, _full: bool) -> Iterator[FittedTable]:
         return
     columns = ["in every direction", "least along", "in the best"]
     table = numeric_table("The drives allow at the tool point, beside the loads that count", "", columns)
-    for part in answer.sets:
-        weakest = direction_words(part.weakest) if part.weakest.size else ""
-        greatest = _amount_text(answer, part.greatest, part.unit)
-        table.add_row(TITLES[part.name], _amount_text(answer, part.least, part.unit), weakest, greatest)
+    for region in answer.sets:
+        weakest = direction_words(region.weakest) if region.weakest.size else ""
+        greatest = _amount_text(answer, region.greatest, region.unit)
+        table.add_row(TITLES[region.name], _amount_text(answer, region.least, region.unit), weakest, greatest)
     yield table
     drives = numeric_table("Drives", "", ["carries", "least", "greatest", "speed"])
     for drive in answer.drives:
@@ -139,18 +146,18 @@ def capability_figures(answer: Capability) -> dict[str, Drawing]:
 def _sets_with_planes(answer: Capability, names: Sequence[str]) -> list[tuple[CapabilitySet, list[tuple[int, int]]]]:
     """Return the sets that can be drawn, each with the planes in which it is more than a line."""
     rows = []
-    for part in answer.sets:
-        if part.name not in names:
+    for region in answer.sets:
+        if region.name not in names:
             continue
-        planes = [pair for pair in combinations(range(3), 2) if _spans(part, pair)]
-        if part.least > 0.0 and np.isfinite(part.least) and planes:
-            rows.append((part, planes))
+        planes = [pair for pair in combinations(range(3), 2) if _spans(region, pair)]
+        if region.least > 0.0 and np.isfinite(region.least) and planes:
+            rows.append((region, planes))
     return rows
 
 
-def _spans(part: CapabilitySet, plane: tuple[int, int]) -> bool:
+def _spans(region: CapabilitySet, plane: tuple[int, int]) -> bool:
     """Return whether both axes of a plane are among the directions that a set has."""
-    projection = part.directions @ part.directions.T
+    projection = region.directions @ region.directions.T
     return all(abs(projection[axis, axis] - 1.0) < DEPENDENT for axis in plane)
 
 
@@ -160,88 +167,92 @@ def capability_figure(
     """Draw the cuts of each set in the planes of the base axes.
 
     Args:
-        answer: an answer with sets.
+        answer: an answer with one of these sets at least, that is more than a line.
         title: over the figure, with braces for the name of the machine.
         sets: the names of the sets that are drawn.
     """
     rows = _sets_with_planes(answer, sets)
     columns = max(len(planes) for _, planes in rows)
+    (width, height), (room_beside, room_above) = PANEL_SIZE, ROOM_BESIDE_PANELS
     with figures.new_figure(
-        (0.5 + 2.3 * columns, 0.9 + 2.25 * len(rows)),
+        (room_beside + width * columns, room_above + height * len(rows)),
         title.format(answer.machine.name),
         setting_of(answer.machine),
         "dashed: what the drives allow in every direction of space; forces and moments beside the loads that count",
     ) as figure:
         panels = figure.subplots(len(rows), columns, squeeze=False)
-        for place, (row, (part, planes)) in enumerate(zip(panels, rows, strict=True)):
+        for place, (row, (region, planes)) in enumerate(zip(panels, rows, strict=True)):
             for panel in row[len(planes) :]:
                 panel.set_visible(False)
-            _draw_row(answer, part, row, planes, figures.COLOURS[place])
+            _draw_row(answer, region, row, planes, figures.COLOURS[place])
     return figure
 
 
 def _draw_row(
-    answer: Capability, part: CapabilitySet, row: Sequence["Axes"], planes: Sequence[tuple[int, int]], colour: str
+    answer: Capability, region: CapabilitySet, row: Sequence["Axes"], planes: Sequence[tuple[int, int]], colour: str
 ) -> None:
-    scale = answer.machine.display.scale(part.unit)
-    greatest = np.abs(part.vertices).max() if len(part.vertices) else OPEN_SET_REACH * part.least
+    """Draw the cuts of a set through zero, a panel for each plane (by the numbers of its axes), with its circle."""
+    scale = answer.machine.display.scale(region.unit)
+    greatest = np.abs(region.vertices).max() if len(region.vertices) else OPEN_SET_REACH * region.least
     reach = PANEL_WIDTH_RATIO * greatest
     for panel, plane in zip(row, planes, strict=False):
-        normals = part.normals[:, list(plane)]
+        normals = region.normals[:, list(plane)]
         # Faces that are parallel to the plane bound nothing in it.
-        crossing = np.linalg.norm(normals, axis=1) > DEPENDENT * np.linalg.norm(part.normals, axis=1)
-        corners = (
-            outline(normals[crossing], part.bounds[crossing], 2.0 * reach) * scale.factor
-        )  # an open side ends outside
+        crossing = np.linalg.norm(normals, axis=1) > DEPENDENT * np.linalg.norm(region.normals, axis=1)
+        corners = scale.factor * outline(normals[crossing], region.bounds[crossing], OUTLINE_REACH * reach)
         panel.add_patch(patches.Polygon(corners, facecolor=colour, alpha=0.25, edgecolor="none"))
         panel.add_patch(patches.Polygon(corners, facecolor="none", edgecolor=colour, linewidth=1.4))
         guide = figures.GUIDE_COLOUR
         panel.add_patch(
-            patches.Circle((0.0, 0.0), part.least * scale.factor, facecolor="none", edgecolor=guide, linestyle="--")
+            patches.Circle((0.0, 0.0), region.least * scale.factor, facecolor="none", edgecolor=guide, linestyle="--")
         )
         panel.plot(0.0, 0.0, "+", color=guide, markersize=5)
         limit = reach * scale.factor
         panel.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal")
         panel.locator_params(axis="x", nbins=4)  # five-digit forces run into each other in three panels side by side
-        panel.set_xlabel(scale.label(f"{part.name} {'xyz'[plane[0]]}"))
-        panel.set_ylabel(scale.label(f"{part.name} {'xyz'[plane[1]]}"))
-    row[0].set_title(TITLES[part.name], loc="left")
-
-
-def _finite(value: float) -> float | None:
-    """Return a number for files; None where there is no limit."""
-    return value if math.isfinite(value) else None
+        panel.set_xlabel(scale.label(f"{region.name} {'xyz'[plane[0]]}"))
+        panel.set_ylabel(scale.label(f"{region.name} {'xyz'[plane[1]]}"))
+    row[0].set_title(TITLES[region.name], loc="left")
 
 
 SETS = (
-    Field(
-        "set", "name", long_name="force, moment, speed, rate, acceleration or angular acceleration", column="quantity"
-    ),
+    Field("set", "name", long_name=f"{', '.join([*TITLES][:-1])} or {[*TITLES][-1]}", column="quantity"),
     Field("unit"),
-    Field("least", lambda part: _finite(part.least), long_name="amount that is allowed in whichever direction, SI"),
+    Field(
+        "least",
+        lambda region: finite_or_none(region.least),
+        long_name="amount that is allowed in whichever direction, SI",
+    ),
     Field(
         "greatest",
-        lambda part: _finite(part.greatest),
+        lambda region: finite_or_none(region.greatest),
         long_name="amount that is allowed in the best direction, SI; none if endless or not held",
     ),
-    Field("weakest", lambda part: part.weakest, long_name="direction of the least, base axes", forms=("json",)),
+    Field("weakest", lambda region: region.weakest, long_name="direction of the least, base axes", forms=("json",)),
     Field(
         "limited_by",
-        lambda part: list(part.limited_by),
+        lambda region: list(region.limited_by),
         long_name="drives at their limits in the direction of the least",
         forms=("json",),
     ),
     Field(
-        "vertices", lambda part: part.vertices.tolist(), long_name="corners of the set, SI, base axes", forms=("json",)
+        "vertices",
+        lambda region: region.vertices.tolist(),
+        long_name="corners of the set, SI, base axes",
+        forms=("json",),
     ),
 )
 """Values of each set of loads or speeds."""
 DRIVES = (
     Field("drive", "name"),
     Field("carried", long_name="load of the drive by what counts already, N or N·m"),
-    Field("lower", lambda drive: _finite(drive.lower), long_name="least load that the drive can carry, N or N·m"),
-    Field("upper", lambda drive: _finite(drive.upper), long_name="greatest load that the drive can carry, N or N·m"),
-    Field("speed", lambda drive: _finite(drive.speed), long_name="greatest speed of the drive, m/s or rad/s"),
+    Field(
+        "lower", lambda drive: finite_or_none(drive.lower), long_name="least load that the drive can carry, N or N·m"
+    ),
+    Field(
+        "upper", lambda drive: finite_or_none(drive.upper), long_name="greatest load that the drive can carry, N or N·m"
+    ),
+    Field("speed", lambda drive: finite_or_none(drive.speed), long_name="greatest speed of the drive, m/s or rad/s"),
 )
 """Values of each drive."""
 

@@ -218,7 +218,7 @@ CORRECTIONS = Description(
 )
 
 
-def _ask(
+def command_or_corrections(
     machine: Machine,
     poses: Path | None = None,
     ranges: Sequence[str] = (),
@@ -226,6 +226,11 @@ def _ask(
     fit: Path | None = None,
     progress: Progress = silent,
 ) -> Command | CorrectionTable:
+    """Compute the commands at poses, or with ranges a table of corrections.
+
+    Raises:
+        InputError: an option that the answer has no use for, or what `command` or `correction_table` refuses.
+    """
     if not ranges:
         if tolerance is not None:
             raise InputError("--tolerance is about the law of a table of corrections; give its axes with --over.")
@@ -240,7 +245,7 @@ def _ask(
 COMMAND_QUESTION = Question(
     example='kinetostat command hexapod --set \'load.gravity=[0, 0, "-9.81 m/s**2"]\' --set tool.mass="20 kg" '
     '--over "gravity_angle=0 deg:90 deg:7" -o corrections.csv',
-    answer=_ask,
+    answer=command_or_corrections,
     options=(
         Option(
             "poses",

@@ -71,6 +71,11 @@ def _nested_lists(values: AnyArray) -> Any:
     return entries.tolist()
 
 
+def finite_or_none(value: float) -> float | None:
+    """Return a number for files, in which None stands for what has no end or is not known."""
+    return value if math.isfinite(value) else None
+
+
 def stiffness_of_spring(stiffness: float | None) -> float | str | None:
     """Return a spring's stiffness as machine files write it: infinity is "rigid"."""
     return "rigid" if stiffness is not None and math.isinf(stiffness) else stiffness

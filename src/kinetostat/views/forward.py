@@ -74,7 +74,8 @@ def coordinates_by_name(texts: Sequence[str]) -> Mapping[str, str]:
     return coordinates
 
 
-def _ask(machine: Machine, starts: int, spread: float, actuators: Sequence[str] = ()) -> Forward:
+def poses_by_texts(machine: Machine, starts: int, spread: float, actuators: Sequence[str] = ()) -> Forward:
+    """Compute the poses of actuator coordinates that are given as texts; see `coordinates_by_name`."""
     return forward(machine, coordinates_by_name(actuators), starts, spread)
 
 
@@ -109,7 +110,7 @@ FORWARD = Description(
 )
 FORWARD_QUESTION = Question(
     example='kinetostat forward hexapod --actuators "leg 1=96 mm, leg 2=95 mm"',
-    answer=_ask,
+    answer=poses_by_texts,
     options=(
         Option(
             "actuators",

@@ -275,7 +275,7 @@ RECORDED_FIT = Description(
 )
 
 
-def _ask(
+def machine_by_measurements(
     machine: Machine,
     data: str,
     fit: Sequence[str] = (),
@@ -290,7 +290,7 @@ def _ask(
     more: int = 0,
     progress: Tell = lambda *_: None,
 ) -> Identification:
-    """Answer the command, whose sizes by group or path are texts "what=size"."""
+    """Identify a machine with the options of the command, whose sizes by group or path are texts "what=size"."""
     return identify(
         machine,
         data,
@@ -323,7 +323,7 @@ def _sizes(
 
 IDENTIFY_QUESTION = Question(
     example="kinetostat identify hexapod measured.csv --fit geometry --fit zeros --frame -o identified",
-    answer=_ask,
+    answer=machine_by_measurements,
     options=(
         Option(
             "data",

@@ -13,6 +13,7 @@ from kinetostat.machine.machine import pose_of, setting_of
 from kinetostat.machine.parameters import with_values
 from kinetostat.studies.lobes import Lobes, lobes
 from kinetostat.vibration.receptance import ASSUMED_RATIO
+from kinetostat.views.data_forms import finite_or_none
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question
 from kinetostat.views.tables import FittedTable, numeric_table
 from kinetostat.views.vibration import tool_sentence
@@ -110,23 +111,25 @@ def lobes_figure(answer: Lobes, title: str = "{}: stability lobes") -> "Figure":
     return figure
 
 
-def _widths(answer: Lobes) -> list[float | None]:
-    return [None if math.isinf(width) else width for width in answer.widths.tolist()]
-
-
 LOBES = Description(
     title="Stability lobes",
     fields=(
         *FIRST_FIELDS,
         Field("teeth"),
         Field("pressure", unit="Pa"),
-        Field("least_width", lambda answer: None if math.isinf(answer.least) else answer.least, "m"),
-        Field("chatter_frequency", lambda answer: None if math.isnan(answer.frequency) else answer.frequency, "Hz"),
+        Field("least_width", lambda answer: finite_or_none(answer.least), "m"),
+        Field("chatter_frequency", lambda answer: finite_or_none(answer.frequency), "Hz"),
         Field("poses"),
         Field("worst_pose", lambda answer: dict(answer.worst), forms=("json",)),
         Field("damping_assumed", "assumed"),
         Field("speed", lambda answer: answer.speeds.tolist(), "1/s", forms=("json",)),
-        Field("width", _widths, "m", "width of cut that stays stable; none where every width is", forms=("json",)),
+        Field(
+            "width",
+            lambda answer: [*map(finite_or_none, answer.widths.tolist())],
+            "m",
+            "width of cut that stays stable; none where every width is",
+            forms=("json",),
+        ),
         Field("width", "widths", "m", "width of cut that stays stable", ("speed",), ("nc",)),
     ),
     lines=_lines,

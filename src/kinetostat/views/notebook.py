@@ -58,7 +58,7 @@ _PLAIN = Console(file=io.StringIO(), width=LINE_LENGTH)
 def html_of(answer: object) -> str:
     """Return a machine or an answer as a piece of HTML: its picture, if it has one, and the tables of the terminal."""
     console = _HtmlConsole()
-    kind_of(answer).tell(console, answer)
+    kind_of(answer).print_to(console, answer)
     tables = "".join(console.parts)
     if isinstance(answer, Machine):
         heading = f"<p><b>{escape(answer.name)}</b> <span class='dim'>{escape(answer.family.summary)}</span></p>"

@@ -34,8 +34,7 @@ from kinetostat.views.optimisation import designs_dataset
 from kinetostat.views.optimisation_figures import convergence
 from kinetostat.views.page import Markup, figure, table, whole_page
 from kinetostat.views.question import Description, Drawing, Field, Lines
-from kinetostat.views.tables import tell as tell_answer
-from kinetostat.views.tables import text_table
+from kinetostat.views.tables import print_answer, text_table
 
 FIGURE_4 = "Fig. 4: stiffness against the stiffness of the passive links"
 FIGURE_5 = "Fig. 5: compliance at z = 68 cm, theta5 = -60 deg, theta6 = 120 deg"
@@ -112,7 +111,7 @@ def figures(reproduction: Reproduction) -> dict[str, Drawing]:
 
 def print_summary(console: Console, reproduction: Reproduction, written: Sequence[Path], full: bool = False) -> None:
     """Print the reproduction, where its files are, and what to try next; every number and statement if `full`."""
-    tell_answer(console, REPRODUCTION, reproduction, full)
+    print_answer(console, REPRODUCTION, reproduction, full)
     hint = "" if full else "; --full prints every number, equation and statement"
     console.print(f"wrote {written[0]} and {len(written) - 1} more files beside it{hint}", highlight=False)
     console.print("next:", highlight=False)

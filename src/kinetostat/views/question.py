@@ -138,7 +138,11 @@ class Drawing:
 
 Lines = Iterable[tuple[str, str]]
 """Sentences, each with the word before it, such as "Damping"."""
-NO_PARTS: Callable[[Any], tuple[()]] = lambda _answer: ()  # noqa: E731 - a default that several fields share
+
+
+def no_parts(*_arguments: Any) -> tuple[()]:
+    """Return no sentences or no tables: those of an answer that has none."""
+    return ()
 
 
 @dataclass(frozen=True)
@@ -165,8 +169,8 @@ class Description:
 
     title: str
     fields: tuple[Field | Records, ...]
-    lines: Callable[[Any], Lines] = NO_PARTS
-    tables: "Callable[..., Iterable[Table | str]]" = NO_PARTS
+    lines: Callable[[Any], Lines] = no_parts
+    tables: "Callable[..., Iterable[Table | str]]" = no_parts
     figures: Late | None = None
     makers: Mapping[str, Late] = field(default_factory=dict)
     axes: tuple[Axis, ...] = ()
@@ -205,7 +209,7 @@ class Description:
         return dict(late(self.figures)(answer)) if self.figures else {}
 
 
-Kind = Literal["flag", "direction", "count", "number", "choice", "quantity", "text", "file", "setting"]
+OptionKind = Literal["flag", "direction", "count", "number", "choice", "quantity", "text", "file", "setting"]
 """Kinds of the value of an option: `quantity` is a text with a unit, and `file` a path. `setting` is a line in the
 table of the machine file that has the option's name: it changes the machine and is not handed to the function."""
 
@@ -229,7 +233,7 @@ class Option:
     """
 
     name: str
-    kind: Kind
+    kind: OptionKind
     meaning: str
     metavar: str = ""
     default: Any = None
@@ -284,7 +288,7 @@ class Question:
         return overrides, arguments
 
 
-QUANTITIES = (
+QUANTITIES_HELP = (
     "compliance, stiffness or free_stiffness (all entries of the diagonal; the free stiffness is 1/C_ii, which a tool "
     "feels; default: {default}); a single entry such as compliance_rx, stiffness_x_z, free_stiffness_z; "
     "least_translational_stiffness, greatest_translational_stiffness, least_rotational_stiffness, "
@@ -316,7 +320,7 @@ VARIED = "FIELD=from:to:count[:log]"
 
 def quantities_option(default: str) -> Option:
     """Return the option `--quantity`, with the quantity that counts where none is named."""
-    meaning = QUANTITIES.format(default=default)
+    meaning = QUANTITIES_HELP.format(default=default)
     return Option("quantities", "text", meaning, metavar="NAME", many=True, word="--quantity")
 
 

@@ -14,6 +14,7 @@ from kinetostat.late import LateModule
 from kinetostat.machine.machine import pose_of, setting_of
 from kinetostat.studies.control import Servo, servo
 from kinetostat.vibration.receptance import ASSUMED_RATIO, along, receptance
+from kinetostat.views.data_forms import finite_or_none
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table
 from kinetostat.views.vibration import RESPONSE, drawn_directions, stiffness_unit
@@ -101,15 +102,10 @@ def _drives(answer: Servo) -> list[dict[str, Any]]:
     ]
 
 
-def _finite(value: float) -> float | None:
-    """Return a number for files, in which None stands for an infinite one."""
-    return None if math.isinf(value) else value
-
-
 def _records_of_drives(answer: Servo) -> list[dict[str, Any]]:
     """Return the numbers of each drive for files."""
     return [
-        {key: _finite(value) if isinstance(value, float) else value for key, value in drive.items()}
+        {key: finite_or_none(value) if isinstance(value, float) else value for key, value in drive.items()}
         for drive in _drives(answer)
     ]
 
@@ -120,9 +116,9 @@ def _stiffnesses(answer: Servo) -> list[dict[str, Any]]:
     return [
         {
             "component": name,
-            "motors_still": _finite(motors_still),
-            "static": _finite(static),
-            "least": _finite(least),
+            "motors_still": finite_or_none(motors_still),
+            "static": finite_or_none(static),
+            "least": finite_or_none(least),
             "least_at": None if math.isinf(least) else frequency,
         }
         for name, motors_still, static, (least, frequency) in rows

@@ -34,10 +34,21 @@ if TYPE_CHECKING:
     from kinetostat.studies.requirements import Verdict
 
 _DECIMAL = re.compile(r"([-+−]?[\d,]+)((?:\.\d+)?)")
+"""A number without a power of ten: its sign and whole part, and what follows from the decimal point on."""
 COLUMN_GAP = 3
 """Characters between two columns; where room is short, there is one."""
 EDGE_SPACE = 2
 """Characters left and right of a table."""
+DIGITS_OF_INPUT = 10
+"""Digits of what people have written themselves: they find it again as it was."""
+PIPED_WIDTH = 100
+"""Width of texts, in characters, where there is no terminal: that of a wide one, in which most tables fit."""
+UNBOUND_WIDTH = 10_000
+"""Width that no table reaches, to measure what a table needs."""
+LEAST_HEAD_WIDTH = 11
+"""Least width of the words that stand before the sentences, in columns of the terminal: sentences then begin alike."""
+HEAD_GAP = 2
+"""Width of the gap between these words and the sentences, in columns of the terminal."""
 
 
 class FittedTable(Table):
@@ -124,7 +135,7 @@ def _blocks(columns: Sequence[_ColumnWidths], gap: int, width: int) -> Iterator[
     first, rest = columns[:1], columns[1:]
     room = width - EDGE_SPACE - sum(column.least for column in first)
     for count in range(1, max(len(rest), 1) + 1):
-        size = -(-len(rest) // count)
+        size = math.ceil(len(rest) / count)
         blocks = [rest[start : start + size] for start in range(0, len(rest), size)] or [[]]
         if all(sum(column.least + gap for column in block) <= room for block in blocks):
             break
@@ -144,14 +155,6 @@ def _widths(columns: Sequence[_ColumnWidths], gap: int, width: int) -> list[int]
             break
         widths[max(loose, key=widths.__getitem__)] -= 1
     return widths
-
-
-DIGITS_OF_INPUT = 10
-"""Digits of what people have written themselves: they find it again as it was."""
-PIPED = 100
-"""Width of texts, in characters, where there is no terminal: that of a wide one, in which most tables fit."""
-UNBOUND = 10_000
-"""Width that no table reaches, to measure what a table needs."""
 
 
 def print_machines(console: Console, heads: Mapping[str, Document]) -> None:
@@ -219,7 +222,7 @@ def readable_value(value: float, quantity: Quantity, display: Display = ENGINEER
     return display.show(value, KINDS[quantity.kind].unit, digits=DIGITS_OF_INPUT)
 
 
-class Piped(Console):
+class PipedConsole(Console):
     """Console for pipes and files: texts wrap at `piped_width()`, tables of numbers take the width they need."""
 
     def print(self, *objects: Any, **options: Any) -> None:
@@ -227,7 +230,7 @@ class Piped(Console):
         tables = [
             item for item in objects if isinstance(item, Table) and all(column.no_wrap for column in item.columns)
         ]
-        unbound = self.options.update(width=UNBOUND)
+        unbound = self.options.update(width=UNBOUND_WIDTH)
         page = self.width
         self.width = max([page, *(self.measure(table, options=unbound).maximum for table in tables)])
         super().print(*objects, **options)
@@ -240,17 +243,17 @@ def terminal() -> Console:
     Texts are shown as they are, whatever brackets and colons are in them; what is styled is a `Text`.
     """
     plain: dict[str, Any] = {"markup": False, "emoji": False}
-    return Console(**plain) if sys.stdout.isatty() else Piped(width=piped_width(), **plain)
+    return Console(**plain) if sys.stdout.isatty() else PipedConsole(width=piped_width(), **plain)
 
 
 def piped_width() -> int:
-    """Return the width of the terminal from which a pipe or a file is written; `PIPED` without a terminal."""
+    """Return the width of the terminal from which a pipe or a file is written; `PIPED_WIDTH` without a terminal."""
     for stream in (sys.stderr, sys.stdin):
         try:
-            return os.get_terminal_size(stream.fileno()).columns or PIPED
+            return os.get_terminal_size(stream.fileno()).columns or PIPED_WIDTH
         except (AttributeError, OSError, ValueError):  # closed, replaced, or no terminal
             continue
-    return PIPED
+    return PIPED_WIDTH
 
 
 def print_written(console: Console, paths: Iterable[Path]) -> None:
@@ -313,13 +316,7 @@ def print_requirements(console: Console, verdicts: "Sequence[Verdict]", display:
     console.print(lines)
 
 
-HEADS = 11
-"""Least width of the words that stand before the sentences, in columns of the terminal: sentences then begin alike."""
-GAP = 2
-"""Width of the gap between these words and the sentences, in columns of the terminal."""
-
-
-def tell(console: Console, description: Description, answer: Any, full: bool = False) -> None:
+def print_answer(console: Console, description: Description, answer: Any, full: bool = False) -> None:
     """Print an answer: first the machine with its state, then a line for each sentence, notes, and the tables.
 
     Args:
@@ -330,9 +327,9 @@ def tell(console: Console, description: Description, answer: Any, full: bool = F
     """
     machine = description.machine_of(answer)
     console.print(Text.assemble((machine.name, "bold"), f"  {description.state(answer)}".rstrip()))
-    lines = Table.grid(padding=(0, GAP, 0, 0))
+    lines = Table.grid(padding=(0, HEAD_GAP, 0, 0))
     sentences = [*description.sentences(answer)]
-    room = console.width - max([HEADS, *(len(head) + GAP for head, _ in sentences)])
+    room = console.width - max([LEAST_HEAD_WIDTH, *(len(head) + HEAD_GAP for head, _ in sentences)])
     for head, sentence in sentences:
         # Rich would also break a line between a number and its percent sign, at a space that is not for breaking.
         lines.add_row(Text(head, "bold"), "\n".join(textwrap.wrap(sentence, room)))
