@@ -20,6 +20,19 @@ from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.renamed import former_names
 from kinetostat.tolerances import EQUAL_STIFFNESSES
 
+DECIMALS_OF_SHARES = 9
+"""Decimals in which shares are compared: equal parts differ by round-off alone, and keep their order."""
+MOST_NAMED = 3
+"""Parts that are named as those that contribute most: a sentence with more is no longer read."""
+LEAST_NAMED_SHARE = 0.05
+"""Share from which a part is named: to stiffen a lesser one gains next to nothing."""
+LEAST_SHARE_TOGETHER = 0.6
+"""Share that the named parts must have together, well more than half; otherwise kinds of parts are named."""
+
+Key = TypeVar("Key")
+Shares: TypeAlias = tuple[tuple[str, float], ...]
+"""Names of parts and their shares, the greatest share first."""
+
 
 @former_names(name="spring", compliance="compliance_share")
 @dataclass(frozen=True, eq=False)
@@ -79,18 +92,6 @@ def by_part(attribution: Sequence[Contribution]) -> dict[str, list[Contribution]
     return parts
 
 
-DECIMALS_OF_SHARES = 9
-"""Decimals in which shares are compared: equal parts differ by round-off alone, and keep their order."""
-MOST_NAMED = 3
-"""Parts that are named as those that contribute most: a sentence with more is no longer read."""
-LEAST_NAMED_SHARE = 0.05
-"""Share from which a part is named: to stiffen a lesser one gains next to nothing."""
-LEAST_SHARE_TOGETHER = 0.6
-"""Share that the named parts must have together, well more than half; otherwise kinds of parts are named."""
-
-Key = TypeVar("Key")
-
-
 class WithGreatest(Protocol):
     """An effect on several directions or indices."""
 
@@ -100,8 +101,6 @@ class WithGreatest(Protocol):
 
 
 Effect = TypeVar("Effect", bound=WithGreatest)
-Shares: TypeAlias = tuple[tuple[str, float], ...]
-"""Names of parts and their shares, the greatest share first."""
 
 
 @dataclass(frozen=True, eq=False)

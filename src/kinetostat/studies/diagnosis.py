@@ -78,6 +78,14 @@ class InstallationCheck:
         return self.state is Soundness.FAILED
 
 
+def _sound(group: str, name: str, detail: str) -> InstallationCheck:
+    return InstallationCheck(group=group, name=name, state=Soundness.SOUND, detail=detail)
+
+
+def _failed(group: str, name: str, detail: str, fix: str) -> InstallationCheck:
+    return InstallationCheck(group=group, name=name, state=Soundness.FAILED, detail=detail, fix=fix)
+
+
 Checks: TypeAlias = Callable[[], Iterator[InstallationCheck]]
 """A function that makes checks one by one."""
 
@@ -89,21 +97,15 @@ class UnsoundError(Exception):
 def check_of(group: str, name: str, question: Callable[[], str], fix: str) -> InstallationCheck:
     """Ask a question and return its answer as a check; whatever it raises is a failure, as anything may be broken."""
     try:
-        return InstallationCheck(group=group, name=name, state=Soundness.SOUND, detail=question())
-    except UnsoundError as wrong:
-        return InstallationCheck(group=group, name=name, state=Soundness.FAILED, detail=str(wrong), fix=fix)
-    except Exception as trouble:
-        return InstallationCheck(
-            group=group,
-            name=name,
-            state=Soundness.FAILED,
-            detail=f"{type(trouble).__name__}: {_first_line(trouble)}",
-            fix=fix,
-        )
+        return _sound(group, name, question())
+    except UnsoundError as fault:
+        return _failed(group, name, str(fault), fix)
+    except Exception as error:
+        return _failed(group, name, f"{type(error).__name__}: {_first_line(error)}", fix)
 
 
-def _first_line(trouble: Exception) -> str:
-    return str(trouble).partition("\n")[0]
+def _first_line(error: Exception) -> str:
+    return str(error).partition("\n")[0]
 
 
 def reinstall(packages: str) -> str:
@@ -121,11 +123,9 @@ def diagnose(parts: Mapping[str, Checks]) -> Iterator[InstallationCheck]:
     for group, checks in parts.items():
         try:
             yield from checks()
-        except Exception as trouble:
-            text = f"cannot be looked at, {type(trouble).__name__}: {_first_line(trouble)}"
-            yield InstallationCheck(
-                group=group, name=group, state=Soundness.FAILED, detail=text, fix=reinstall(PACKAGE)
-            )
+        except Exception as error:
+            detail = f"cannot be looked at, {type(error).__name__}: {_first_line(error)}"
+            yield _failed(group, group, detail, reinstall(PACKAGE))
 
 
 def healthy(checks: Sequence[InstallationCheck]) -> bool:
@@ -146,18 +146,14 @@ def software_checks() -> Iterator[InstallationCheck]:
     """The package itself, Python, every package that it needs, and what every extra adds."""
     group = "software"
     try:
-        yield InstallationCheck(group=group, name=PACKAGE, state=Soundness.SOUND, detail=version(PACKAGE))
+        yield _sound(group, PACKAGE, version(PACKAGE))
     except PackageNotFoundError:
-        text = "runs from its source files and is not installed: what it needs cannot be looked up"
-        yield InstallationCheck(
-            group=group, name=PACKAGE, state=Soundness.FAILED, detail=text, fix=install_command([PACKAGE])
-        )
+        detail = "runs from its source files and is not installed: what it needs cannot be looked up"
+        yield _failed(group, PACKAGE, detail, install_command([PACKAGE]))
         return
-    python = f"{platform.python_version()} ({platform.python_implementation()})"
-    yield InstallationCheck(group=group, name="python", state=Soundness.SOUND, detail=python)
+    yield _sound(group, "python", f"{platform.python_version()} ({platform.python_implementation()})")
     for requirement in requirements():
-        state, text, fix = _package_state(requirement)
-        yield InstallationCheck(group=group, name=requirement.name, state=state, detail=text, fix=fix)
+        yield _package_check(group, requirement)
     for extra in metadata(PACKAGE).get_all("Provides-Extra") or ():
         yield _extra_check(extra)
 
@@ -167,29 +163,25 @@ def requirements(extra: str = "") -> "list[Requirement]":
     from packaging.requirements import Requirement
 
     listed = [Requirement(text) for text in requires(PACKAGE) or ()]
-    core = [needed for needed in listed if needed.marker is None or needed.marker.evaluate({"extra": ""})]
+    core = [each for each in listed if each.marker is None or each.marker.evaluate({"extra": ""})]
     if not extra:
         return core
-    return [
-        needed for needed in listed if needed not in core and needed.marker and needed.marker.evaluate({"extra": extra})
-    ]
+    return [each for each in listed if each not in core and each.marker and each.marker.evaluate({"extra": extra})]
 
 
-def _package_state(requirement: "Requirement") -> tuple[Soundness, str, str]:
-    """Whether a package that is needed is installed, in a version that suits, and loads: state, detail and remedy."""
-    wanted = f"{requirement.name}{requirement.specifier}"
-    present = _installed_version(requirement)
+def _package_check(group: str, requirement: "Requirement") -> InstallationCheck:
+    """Whether a package that is needed is installed, in a version that suits, and loads."""
+    name, specifier, present = requirement.name, requirement.specifier, _installed_version(requirement)
     if present is None:
-        return Soundness.FAILED, "is not installed", install_command([wanted])
-    if not requirement.specifier.contains(present, prereleases=True):
-        text = f"{present} is installed, but {requirement.specifier} is needed"
-        return Soundness.FAILED, text, install_command([wanted])
+        return _failed(group, name, "is not installed", install_command([f"{name}{specifier}"]))
+    if not specifier.contains(present, prereleases=True):
+        detail = f"{present} is installed, but {specifier} is needed"
+        return _failed(group, name, detail, install_command([f"{name}{specifier}"]))
     try:
-        import_module(LOADED_MODULES[requirement.name.lower()])
-    except Exception as trouble:
-        text = f"{present} is installed, but does not load: {_first_line(trouble)}"
-        return Soundness.FAILED, text, reinstall(requirement.name)
-    return Soundness.SOUND, present, ""
+        import_module(LOADED_MODULES[name.lower()])
+    except Exception as error:
+        return _failed(group, name, f"{present} is installed, but does not load: {_first_line(error)}", reinstall(name))
+    return _sound(group, name, present)
 
 
 def _extra_check(extra: str) -> InstallationCheck:
@@ -197,12 +189,9 @@ def _extra_check(extra: str) -> InstallationCheck:
     versions_by_name = {requirement.name: _installed_version(requirement) for requirement in requirements(extra)}
     missing = [name for name, present in versions_by_name.items() if present is None]
     if missing:
-        text = f"not installed ({', '.join(missing)})"
-        return InstallationCheck(
-            group="extras", name=extra, state=Soundness.ABSENT, detail=text, fix=extra_command(extra)
-        )
-    versions = ", ".join(f"{name} {present}" for name, present in versions_by_name.items())
-    return InstallationCheck(group="extras", name=extra, state=Soundness.SOUND, detail=versions)
+        detail, fix = f"not installed ({', '.join(missing)})", extra_command(extra)
+        return InstallationCheck(group="extras", name=extra, state=Soundness.ABSENT, detail=detail, fix=fix)
+    return _sound("extras", extra, ", ".join(f"{name} {present}" for name, present in versions_by_name.items()))
 
 
 def _installed_version(requirement: "Requirement") -> str | None:
@@ -215,12 +204,12 @@ def _installed_version(requirement: "Requirement") -> str | None:
 def machine_checks() -> Iterator[InstallationCheck]:
     """System, processor, its vectors, and memory."""
     group, system = "machine", f"{platform.system()} {platform.release()}, {platform.machine()}"
-    yield InstallationCheck(group=group, name="system", state=Soundness.SOUND, detail=system)
+    yield _sound(group, "system", system)
     yield check_of(group, "processor", _cores, reinstall("numpy"))
     yield check_of(group, "vectors", _vectors, reinstall("llvmlite"))
     memory = _memory_size()
     if memory is not None:
-        yield InstallationCheck(group=group, name="memory", state=Soundness.SOUND, detail=f"{memory / 2**30:.1f} GiB")
+        yield _sound(group, "memory", f"{memory / 2**30:.1f} GiB")
 
 
 def processor() -> str:

@@ -16,6 +16,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -54,8 +55,6 @@ DIGITS_OF_ELEVATION = 9
 """Decimals, rad, in which elevations at which parts of a leg reverse are compared: the same ones are one reversal."""
 ANSWERS_BEFORE_REQUIREMENTS = 4
 """Questions that are answered at all elevations together: states at rest, frequencies, corrections and budget."""
-CLEARANCE, ZERO = ".clearance.", ".zero"
-"""Parts of the paths of errors that are free motions of a joint, and of those that are lengths of a drive."""
 
 
 @dataclass(frozen=True)
@@ -186,7 +185,7 @@ def elevation(
     progress(ANSWERS_BEFORE_REQUIREMENTS, steps)
     driven = states.mechanism.driven
     loads = np.asarray(numbers.get("drive_loads", np.full((count, len(driven)), np.nan)))
-    at_rest = np.isfinite(loads).all(axis=1)
+    at_rest = np.isfinite(loads).all(axis=1)  # states without rest have no loads
 
     def requirements_done(judged: int) -> None:
         progress(ANSWERS_BEFORE_REQUIREMENTS + judged, steps)
@@ -280,15 +279,15 @@ def _reversals(model: ErrorModel, angles: Array, machine: Machine) -> tuple[Reve
     reactions = np.einsum("nie,ni->ne", rates, model.drawn.load)
     round_off = NO_REACTION * float(greatest_work(model.drawn.load, model.length).max())
     gaps = _gaps(model, machine)
-    parts_by_place: dict[tuple[str, float], list[_ReversedPart]] = {}
-    for (leg, part), places in _free_motions(model).items():
-        gap = gaps.get((leg, part))
+    parts_by_leg_and_height: dict[tuple[str, float], list[_ReversedPart]] = {}
+    for part, places in _free_motions(model).items():
+        gap = gaps.get(part)
         for angle, direction in _zeros_of_reaction(reactions[:, places], angles, round_off):
             # The drawn machine stays where it is, so that all elevations share the rates of the first one.
             twist = None if gap is None else rates[0][:, places] @ (direction * gap)
             height = round(UPRIGHT - angle, DIGITS_OF_ELEVATION)
-            parts_by_place.setdefault((leg, height), []).append(_ReversedPart(part, twist))
-    reversals = [_reversal(leg, height, parts) for (leg, height), parts in parts_by_place.items()]
+            parts_by_leg_and_height.setdefault((part.leg, height), []).append(_ReversedPart(part.name, twist))
+    reversals = [_reversal(leg, height, parts) for (leg, height), parts in parts_by_leg_and_height.items()]
     return tuple(sorted(reversals, key=lambda reversal: reversal.elevation))
 
 
@@ -326,35 +325,37 @@ class _ReversedPart:
     twist: Array | None
 
 
-def _free_motions(model: ErrorModel) -> dict[tuple[str, str], list[int]]:
-    """Places of the errors along which each joint and each drive could move, by leg and name."""
-    motions: dict[tuple[str, str], list[int]] = {}
+class _LegPart(NamedTuple):
+    """A joint or a drive: name of its leg, and its own."""
+
+    leg: str
+    name: str
+
+
+def _part_of(path: str, leg: str) -> _LegPart:
+    """The part of a leg that an error is about, its clearance or the zero of its drive, by the path of the error."""
+    return _LegPart(leg, path.removeprefix(f"legs.{leg}.").removesuffix(".zero").partition(".clearance")[0])
+
+
+def _free_motions(model: ErrorModel) -> dict[_LegPart, list[int]]:
+    """Places of the errors along which each joint and each drive could move."""
+    motions: dict[_LegPart, list[int]] = {}
     for place, error in enumerate(model.errors):
-        name = error.path.removeprefix(f"legs.{error.leg}.")
-        if error.group == "clearances":
-            motions.setdefault((error.leg, name.rpartition(CLEARANCE)[0]), []).append(place)
-        elif error.group == "zeros":
-            motions[error.leg, name.removesuffix(ZERO)] = [place]
+        if error.group in ("clearances", "zeros"):
+            motions.setdefault(_part_of(error.path, error.leg), []).append(place)
     return motions
 
 
-def _gaps(model: ErrorModel, machine: Machine) -> dict[tuple[str, str], float]:
+def _gaps(model: ErrorModel, machine: Machine) -> dict[_LegPart, float]:
     """Distance between the ends of each clearance with a tolerance, and of the backlash of each drive, m or rad."""
-    gaps: dict[tuple[str, str], float] = {}
-    plays = {
-        name_of(spring): float(unseen_backlash(machine, spring))
-        for spring in driven_springs(state_of(machine).configuration)
-    }
-    for error in model.errors:
-        if error.group == "zeros":
-            joint = error.path.removeprefix(f"legs.{error.leg}.").removesuffix(ZERO)
-            if plays.get(f"{error.leg} {joint}"):
-                gaps[error.leg, joint] = plays[f"{error.leg} {joint}"]
+    driven = driven_springs(state_of(machine).configuration)
+    backlashes = {name_of(spring): float(unseen_backlash(machine, spring)) for spring in driven}
+    drives = [_part_of(error.path, error.leg) for error in model.errors if error.group == "zeros"]
+    gaps = {drive: gap for drive in drives if (gap := backlashes.get(f"{drive.leg} {drive.name}"))}
     if machine.tolerances:
         for part in toleranced_parts(machine, model.errors, machine.tolerances):
             if part.free:
-                name = part.path.removeprefix(f"legs.{part.leg}.").removesuffix(CLEARANCE.rstrip("."))
-                gaps[part.leg, name] = 2.0 * part.limit
+                gaps[_part_of(part.path, part.leg)] = 2.0 * part.limit
     return gaps
 
 

@@ -43,6 +43,8 @@ else:
 
 MATRICES = {"K": "stiffness", "C": "compliance"}
 """Beginning of the names of entries, by the name of the matrix."""
+NOT_CONVERGED = int(Status.NOT_CONVERGED)
+"""Code of a point at which a program has found no joints, and another way may."""
 MACHINES_KEPT = 8
 """Machines, by identity, whose facts that do not depend on the poses are kept: as many as a program mostly compares."""
 
@@ -207,10 +209,6 @@ def _runs(numbers: Sequence[int]) -> list[tuple[int, int]]:
     """Begin and end of each run of consecutive numbers."""
     beginnings = [k for k in numbers if k - 1 not in numbers]
     return list(zip(beginnings, [k + 1 for k in numbers if k + 1 not in numbers], strict=True))
-
-
-NOT_CONVERGED = int(Status.NOT_CONVERGED)
-"""Code of a point at which a program has found no joints, and another way may."""
 
 
 @checked
