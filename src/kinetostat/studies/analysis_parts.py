@@ -171,7 +171,7 @@ class LoadCase(ImmutableAnswer):
 
 
 def load_case(
-    response: Response, statics: Statics, turn: Rotation, kept: Sequence[int] = range(SIZE)
+    response: Response, statics: Statics, turn: Rotation, components: Sequence[int] = range(SIZE)
 ) -> LoadCase | None:
     """Compute the effects of a machine's load; None if its file gives none.
 
@@ -179,24 +179,25 @@ def load_case(
         response: the response of the machine, its load included; base axes.
         statics: the statics of the machine, in the axes of the results.
         turn: rotation from base axes to those of the results.
-        kept: places of the components that the machine has.
+        components: numbers of the components that the machine has, from rx ry rz x y z = 0 ... 5.
     """
     wrench = response.load
     if not any(wrench.components()):
         return None
     length = float(response.configuration.length)
     load = clean_screw(wrench.rotated(turn), length)
-    size = float(wrench.rotational.norm() + wrench.translational.norm() * length)
-    chosen = list(kept)
+    size_of_load = float(wrench.rotational.norm() + wrench.translational.norm() * length)
+    rows = list(components)
     loads_of_springs = zip(springs(response.configuration), spring_loads(response, wrench), strict=True)
     reactions = []
-    for each in joint_reactions(response, wrench):
-        passed_on = np.array(clean_screw(each.wrench.rotated(turn), length, size).components(), dtype=float)
-        reactions.append(Reaction(leg=each.leg, joint=each.joint, point=each.point, wrench=passed_on[chosen]))
+    for at_joint in joint_reactions(response, wrench):
+        cleaned = clean_screw(at_joint.wrench.rotated(turn), length, size_of_load)
+        passed_on = np.array(cleaned.components(), dtype=float)[rows]
+        reactions.append(Reaction(leg=at_joint.leg, joint=at_joint.joint, point=at_joint.point, wrench=passed_on))
     return LoadCase(
-        components=tuple(COMPONENTS[i] for i in kept),
-        wrench=np.array(load.components(), dtype=float)[chosen],
-        deflection=np.array(_deflection(statics, load))[chosen],
+        components=tuple(COMPONENTS[i] for i in components),
+        wrench=np.array(load.components(), dtype=float)[rows],
+        deflection=np.array(_deflection(statics, load))[rows],
         springs=tuple(_spring_load(spring, float(amount)) for spring, amount in loads_of_springs),
         reactions=tuple(reactions),
     )
@@ -204,20 +205,22 @@ def load_case(
 
 def _deflection(statics: Statics, load: Wrench) -> tuple[float, ...]:
     """C w without round-off: no component i can exceed sqrt(C_ii w C w), because C is positive semidefinite."""
-    energy = sum(float(s) * float(load.work(twist)) ** 2 for twist, s in statics.motions if s < math.inf)
-    pairs = zip(deflection(statics, load).components(), held_compliance(statics).diagonal(), strict=True)
-    bounds = [(float(c), math.sqrt(max(energy * float(entry), 0.0)) if entry else 0.0) for c, entry in pairs]
-    return tuple(0.0 if abs(c) < ROUND_OFF_OF_ENTRY * bound < math.inf else c for c, bound in bounds)
+    energy = sum(float(s) * float(load.work(twist)) ** 2 for twist, s in statics.motions if s < math.inf)  # w C w
+    motions = [float(component) for component in deflection(statics, load).components()]
+    entries = [float(entry) for entry in held_compliance(statics).diagonal()]
+    bounds = [math.sqrt(max(energy * entry, 0.0)) if entry else 0.0 for entry in entries]
+    pairs = zip(motions, bounds, strict=True)
+    return tuple(0.0 if abs(motion) < ROUND_OFF_OF_ENTRY * bound < math.inf else motion for motion, bound in pairs)
 
 
 def _spring_load(spring: Spring, load: float) -> SpringLoad:
     """The load and the deformation of a spring; a free one deforms without end under a load, and not at all without."""
     stiffness = float(spring.stiffness)
-    if_free = math.copysign(math.inf, load) if load else 0.0
+    without_stiffness = math.copysign(math.inf, load) if load else 0.0
     return SpringLoad(
         name=spring.name,
         actuated=spring.actuated,
         turning=spring.joint.point is not None,
         load=load,
-        deformation=load / stiffness if stiffness else if_free,
+        deformation=load / stiffness if stiffness else without_stiffness,
     )

@@ -78,11 +78,11 @@ class InstallationCheck:
         return self.state is Soundness.FAILED
 
 
-def _sound(group: str, name: str, detail: str) -> InstallationCheck:
+def _sound_check(group: str, name: str, detail: str) -> InstallationCheck:
     return InstallationCheck(group=group, name=name, state=Soundness.SOUND, detail=detail)
 
 
-def _failed(group: str, name: str, detail: str, fix: str) -> InstallationCheck:
+def _failure(group: str, name: str, detail: str, fix: str) -> InstallationCheck:
     return InstallationCheck(group=group, name=name, state=Soundness.FAILED, detail=detail, fix=fix)
 
 
@@ -97,11 +97,11 @@ class UnsoundError(Exception):
 def check_of(group: str, name: str, question: Callable[[], str], fix: str) -> InstallationCheck:
     """Ask a question and return its answer as a check; whatever it raises is a failure, as anything may be broken."""
     try:
-        return _sound(group, name, question())
+        return _sound_check(group, name, question())
     except UnsoundError as fault:
-        return _failed(group, name, str(fault), fix)
+        return _failure(group, name, str(fault), fix)
     except Exception as error:
-        return _failed(group, name, f"{type(error).__name__}: {_first_line(error)}", fix)
+        return _failure(group, name, f"{type(error).__name__}: {_first_line(error)}", fix)
 
 
 def _first_line(error: Exception) -> str:
@@ -125,7 +125,7 @@ def diagnose(parts: Mapping[str, Checks]) -> Iterator[InstallationCheck]:
             yield from checks()
         except Exception as error:
             detail = f"cannot be looked at, {type(error).__name__}: {_first_line(error)}"
-            yield _failed(group, group, detail, reinstall(PACKAGE))
+            yield _failure(group, group, detail, reinstall(PACKAGE))
 
 
 def healthy(checks: Sequence[InstallationCheck]) -> bool:
@@ -146,12 +146,12 @@ def software_checks() -> Iterator[InstallationCheck]:
     """The package itself, Python, every package that it needs, and what every extra adds."""
     group = "software"
     try:
-        yield _sound(group, PACKAGE, version(PACKAGE))
+        yield _sound_check(group, PACKAGE, version(PACKAGE))
     except PackageNotFoundError:
         detail = "runs from its source files and is not installed: what it needs cannot be looked up"
-        yield _failed(group, PACKAGE, detail, install_command([PACKAGE]))
+        yield _failure(group, PACKAGE, detail, install_command([PACKAGE]))
         return
-    yield _sound(group, "python", f"{platform.python_version()} ({platform.python_implementation()})")
+    yield _sound_check(group, "python", f"{platform.python_version()} ({platform.python_implementation()})")
     for requirement in requirements():
         yield _package_check(group, requirement)
     for extra in metadata(PACKAGE).get_all("Provides-Extra") or ():
@@ -173,15 +173,17 @@ def _package_check(group: str, requirement: "Requirement") -> InstallationCheck:
     """Whether a package that is needed is installed, in a version that suits, and loads."""
     name, specifier, present = requirement.name, requirement.specifier, _installed_version(requirement)
     if present is None:
-        return _failed(group, name, "is not installed", install_command([f"{name}{specifier}"]))
+        return _failure(group, name, "is not installed", install_command([f"{name}{specifier}"]))
     if not specifier.contains(present, prereleases=True):
         detail = f"{present} is installed, but {specifier} is needed"
-        return _failed(group, name, detail, install_command([f"{name}{specifier}"]))
+        return _failure(group, name, detail, install_command([f"{name}{specifier}"]))
     try:
         import_module(LOADED_MODULES[name.lower()])
     except Exception as error:
-        return _failed(group, name, f"{present} is installed, but does not load: {_first_line(error)}", reinstall(name))
-    return _sound(group, name, present)
+        return _failure(
+            group, name, f"{present} is installed, but does not load: {_first_line(error)}", reinstall(name)
+        )
+    return _sound_check(group, name, present)
 
 
 def _extra_check(extra: str) -> InstallationCheck:
@@ -191,7 +193,7 @@ def _extra_check(extra: str) -> InstallationCheck:
     if missing:
         detail, fix = f"not installed ({', '.join(missing)})", extra_command(extra)
         return InstallationCheck(group="extras", name=extra, state=Soundness.ABSENT, detail=detail, fix=fix)
-    return _sound("extras", extra, ", ".join(f"{name} {present}" for name, present in versions_by_name.items()))
+    return _sound_check("extras", extra, ", ".join(f"{name} {present}" for name, present in versions_by_name.items()))
 
 
 def _installed_version(requirement: "Requirement") -> str | None:
@@ -204,12 +206,12 @@ def _installed_version(requirement: "Requirement") -> str | None:
 def machine_checks() -> Iterator[InstallationCheck]:
     """System, processor, its vectors, and memory."""
     group, system = "machine", f"{platform.system()} {platform.release()}, {platform.machine()}"
-    yield _sound(group, "system", system)
+    yield _sound_check(group, "system", system)
     yield check_of(group, "processor", _cores, reinstall("numpy"))
     yield check_of(group, "vectors", _vectors, reinstall("llvmlite"))
     memory = _memory_size()
     if memory is not None:
-        yield _sound(group, "memory", f"{memory / 2**30:.1f} GiB")
+        yield _sound_check(group, "memory", f"{memory / 2**30:.1f} GiB")
 
 
 def processor() -> str:

@@ -147,7 +147,7 @@ def _state_and_cables(machine: Identical) -> tuple[MachineState, int]:
 
 
 class Buffers:
-    """Inputs of a function at a number of points, its results there, and the call that fills the one from the others.
+    """Inputs of a function at a number of points, its results there, and the call that computes these from those.
 
     Each thread needs buffers of its own.
 
@@ -168,7 +168,8 @@ class Buffers:
         """
         direct, self._function, self._count = function.direct, function, count
         program = direct.program if direct and isinstance(direct.program, Program) else None
-        # A program fills all lanes of a vector register: memory has room for one register at least.
+        # A program fills all lanes of a vector register: memory has room for one register at least, and points beyond
+        # the count keep the inputs to begin with.
         room = max(count, program.lanes) if program else count
         inputs = np.repeat(np.asarray(start, dtype=float)[:, None], room, axis=1)
         results = np.empty((function.rows, room))
@@ -180,6 +181,7 @@ class Buffers:
         self._angles: list[Array] = []
         self._run = None
         if direct and program:
+            # Neighbouring rows are one view, so that a call compares all of them by one product.
             rows_of_angles = sorted({rows[path] for path in direct.form.turning})
             self._angles = [inputs[first:end].reshape(-1) for first, end in _runs(rows_of_angles)]
             varying = [inputs[rows[path]] for path in direct.form.varying]
@@ -190,9 +192,10 @@ class Buffers:
         if self._run is None:
             self._evaluate()
             return self.results
-        for row in self._angles:
-            # No angle exceeds the root of the sum of squares; beyond it, one may be too large for traced cosines.
-            if not row.dot(row) <= LARGEST_ANGLE**2:
+        for angles in self._angles:
+            # No angle exceeds the root of the sum of squares; where this is larger, or NaN, one angle may be too large
+            # for traced cosines.
+            if not angles.dot(angles) <= LARGEST_ANGLE**2:
                 self._evaluate()
                 return self.results
         self._run()

@@ -21,7 +21,7 @@ from kinetostat.studies.study_folder import (
 )
 
 RESULT_FILE = "result.json"
-"""File that a search writes last but for tables and figures."""
+"""File that a search writes last but for tables and figures: where it lies, all steps have been done."""
 
 
 def has_checks(folder: Path) -> bool:
@@ -129,14 +129,23 @@ def _check_of_study(folder: Path) -> StepsCheck:
     question = read_question(folder)
     records = {record["chunk"]: record for record in read_history(folder)[0]}
     history = (folder / HISTORY).read_bytes() if (folder / HISTORY).exists() else b""
+    # A last line without an end is one that another process is writing now, or one that was cut short.
     cut_short = bool(history) and not history.endswith(b"\n") and not in_use(folder)
     broken = history.count(b"\n") + cut_short - len(records)
-    check = _check_of_search if "optimisation" in question else _check_of_grid
-    return check(folder, question, records, broken)
+    if "optimisation" in question:
+        return _check_of_search(folder, question, records, broken)
+    return _check_of_grid(folder, question, records, broken)
 
 
 def _check_of_search(folder: Path, question: Record, records: dict[int, Record], broken: int) -> StepsCheck:
-    """The check of the steps of a search, of whose history so many lines are broken."""
+    """The check of the steps of a search.
+
+    Args:
+        folder: its folder.
+        question: the study, as it was noted when it began.
+        records: what was noted about each step that is done, by its number.
+        broken: number of lines of its history that cannot be read.
+    """
     total = max((record.get("of", 0) for record in records.values()), default=0)
     damaged = _damaged_steps(folder, question, records)
     intact, finished = len(records) - damaged, (folder / RESULT_FILE).exists()
@@ -144,7 +153,7 @@ def _check_of_search(folder: Path, question: Record, records: dict[int, Record],
 
 
 def _check_of_grid(folder: Path, question: Record, records: dict[int, Record], broken: int) -> StepsCheck:
-    """The check of the chunks of a grid, of whose history so many lines are broken."""
+    """The check of the chunks of a grid; arguments as for `_check_of_search`."""
     if LAYOUT not in question:  # begun by a version without checksums of the file
         return StepsCheck(parts="chunks", intact=len(records), damaged=broken, missing=0, frame=True, checked=False)
     final = folder / str(question.get("file"))
@@ -168,14 +177,13 @@ def _check_of_grid(folder: Path, question: Record, records: dict[int, Record], b
 def _steps_check(
     parts: str, intact: int, damaged: int, total: int, finished: bool, question: Record, frame: bool = True
 ) -> StepsCheck:
-    """The check of parts of which some are known to be damaged: of a finished study, those that lack are lost."""
-    lacking = max(total - intact - damaged, 0)
-    lost, missing = (lacking, 0) if finished else (0, lacking)
+    """The check of `total` parts, of which the others than those intact or damaged are lost if the study is finished."""
+    others = max(total - intact - damaged, 0)
     return StepsCheck(
         parts=parts,
         intact=intact,
-        damaged=damaged + lost,
-        missing=missing,
+        damaged=damaged + (others if finished else 0),
+        missing=0 if finished else others,
         frame=frame,
         checked=has_checksums(question),
     )
