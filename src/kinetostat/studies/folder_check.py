@@ -177,7 +177,7 @@ def _check_of_grid(folder: Path, question: Record, records: dict[int, Record], b
 def _steps_check(
     parts: str, intact: int, damaged: int, total: int, finished: bool, question: Record, frame: bool = True
 ) -> StepsCheck:
-    """The check of `total` parts, of which the others than those intact or damaged are lost if the study is finished."""
+    """The check of `total` parts: those that are neither intact nor damaged are lost if the study is finished."""
     others = max(total - intact - damaged, 0)
     return StepsCheck(
         parts=parts,
