@@ -7,7 +7,7 @@ import pytest
 
 from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.kinetostatics.quantities import QUANTITIES
-from kinetostat.studies.pose_conditions import parse_condition
+from kinetostat.studies.quantities import parse_condition
 from refusals import refused
 
 READ = [

@@ -8,8 +8,7 @@ import pytest
 from kinetostat import load
 from kinetostat.kinetostatics.response import respond
 from kinetostat.studies.optimisation.result import ComplianceChange, Result
-from kinetostat.studies.pose_conditions import parse_condition
-from kinetostat.studies.quantities import resolve_quantities
+from kinetostat.studies.quantities import parse_condition, resolve_quantities
 
 COMPONENTS = ("rx", "ry", "rz", "x", "y", "z")
 

@@ -26,8 +26,9 @@ from kinetostat.machine.parameters import POSE, find, named_entry, values
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.requirements import Requirement, is_text
+from kinetostat.studies.csv_columns import GivenColumn, columns_of
 from kinetostat.studies.moves import along_profile, moves_between, profile
-from kinetostat.studies.poses import GivenColumn, Where, column_values, columns_of, read_columns, unit_doubt
+from kinetostat.studies.poses import Where, column_values, read_columns, unit_doubt
 
 TIME, FEED, ACCELERATION, JERK, SHAPE = "time", "feed", "acceleration", "jerk", "shape"
 """Names of columns beside those of the pose and of loads: when, or how fast, each pose is reached."""

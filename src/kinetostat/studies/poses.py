@@ -4,10 +4,7 @@ Whatever they come from, they become columns, of which every value is checked in
 pandas, polars and xarray are read by what they can do, so that none of these libraries need be there.
 """
 
-import csv
 import math
-import re
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -26,25 +23,20 @@ from kinetostat.machine.parameters import POSE, Parameter, find, parameters
 from kinetostat.spec.arguments import as_list
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, Range, parse_range, quantities
+from kinetostat.studies.csv_columns import MOST_GIVEN_POSES, GivenColumn, columns_of
 from kinetostat.units import UnitError, parse
 
-MOST_GIVEN_POSES = 5_000_000
-"""Poses whose answers fit in memory: a dozen quantities of them take half a gigabyte."""
-
-
-@dataclass(frozen=True)
-class GivenColumn:
-    """A column as it was given.
-
-    Attributes:
-        name: name of the field, as written.
-        entries: numbers, or texts with a unit.
-        unit: unit of the numbers; SI where it is empty.
-    """
-
-    name: str
-    entries: Any
-    unit: str = ""
+MOST_DIMENSIONS = 6
+"""Axes of one grid: a pose has six coordinates."""
+POSE_FORMS = (
+    "give a DataFrame or a dictionary with a column for each field that changes, an array with a column for each "
+    "coordinate of the pose, an xarray Dataset, or the path of a CSV file"
+)
+"""The end of messages about poses in no form that is read."""
+MOST_MACHINE_LENGTHS = 50.0
+"""Characteristic lengths of a machine beyond which no coordinate of its pose is: a mm is a thousandth of a m."""
+ANSWERS = {"pose", "status", *QUANTITIES}
+"""Columns that `kinetostat path` writes beside the poses: its own files are read again without them."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +91,7 @@ def read_columns(
     if not columns:
         raise InputError("poses has no columns; name the field that each column holds, e.g. x.")
     columns = _with_angles(machine, columns, where)
-    fields = [_field(machine, column.name) for column in columns]
+    fields = [_field_of_column(machine, column.name) for column in columns]
     leaves = [leaf for field in fields for leaf in field.leaves]
     for leaf in leaves:
         if leaves.count(leaf) > 1:
@@ -140,7 +132,7 @@ def _with_angles(machine: Machine, columns: Sequence[GivenColumn], where: Where)
     return [*others, *(GivenColumn(name, named[name]) for name in ANGLES)]
 
 
-def _field(machine: Machine, name: object) -> Parameter:
+def _field_of_column(machine: Machine, name: object) -> Parameter:
     if not isinstance(name, str):
         raise InputError(f"a column of the poses is called {shorten(name)}; name a field of the machine, e.g. x.")
     try:
@@ -158,20 +150,22 @@ def column_values(column: GivenColumn, quantity: Quantity, where: Where) -> Arra
     Raises:
         InputError: a value is not finite, of another kind or not allowed.
     """
-    values = _numbers(column, quantity)
+    values = _plain_numbers(column, quantity)
     if values is None:
-        entries = _entries(column).tolist()
-        values = np.array([_entry(column, entry, quantity, where(column.name, i)) for i, entry in enumerate(entries)])
+        entries = _entries_of(column).tolist()
+        values = np.array(
+            [_value_of_entry(column, entry, quantity, where(column.name, i)) for i, entry in enumerate(entries)]
+        )
     # Allowed values form an interval, so that the extremes and whatever is not finite decide for all.
-    suspects = [*np.flatnonzero(~np.isfinite(values))[:1], *([values.argmin(), values.argmax()] if values.size else [])]
-    for i in suspects:
-        _check(float(values[i]), quantity, where(column.name, int(i)))
+    extremes = [values.argmin(), values.argmax()] if values.size else []
+    for i in [*np.flatnonzero(~np.isfinite(values))[:1], *extremes]:
+        _check_value(float(values[i]), quantity, where(column.name, int(i)))
     return values
 
 
-def _numbers(column: GivenColumn, quantity: Quantity) -> Array | None:
+def _plain_numbers(column: GivenColumn, quantity: Quantity) -> Array | None:
     """Return the values of a column of plain numbers, SI; None where there is anything else in it."""
-    entries = _entries(column)
+    entries = _entries_of(column)
     if entries.dtype.kind not in "iufUS":
         return None
     try:
@@ -180,7 +174,8 @@ def _numbers(column: GivenColumn, quantity: Quantity) -> Array | None:
         return None
 
 
-def _entries(column: GivenColumn) -> Any:
+def _entries_of(column: GivenColumn) -> Any:
+    """The entries of a column as an array of one dimension; a single value is a column of length one."""
     try:
         entries = np.atleast_1d(np.asarray(column.entries))
     except ValueError:  # rows of several lengths
@@ -190,7 +185,7 @@ def _entries(column: GivenColumn) -> Any:
     return entries
 
 
-def _entry(column: GivenColumn, entry: Any, quantity: Quantity, place: str) -> float:
+def _value_of_entry(column: GivenColumn, entry: Any, quantity: Quantity, place: str) -> float:
     """Return one value in SI: a number in the column's unit, or text with a unit of its own."""
     text = entry.strip() if isinstance(entry, str) else entry
     if isinstance(text, str) and column.unit and text and text[-1].isdecimal():
@@ -201,22 +196,13 @@ def _entry(column: GivenColumn, entry: Any, quantity: Quantity, place: str) -> f
         raise InputError(f"{place} is {shorten(entry)}: {error}.") from None
 
 
-def _check(value: float, quantity: Quantity, place: str) -> None:
+def _check_value(value: float, quantity: Quantity, place: str) -> None:
     if not np.isfinite(value):
         raise InputError(f"{place} is {value:g}, which is not a finite number; give a number, or remove the pose.")
     try:
         quantity.check(value)
     except UnitError as error:
         raise InputError(f"{place} is {quantity.show(value)}: {error}.") from None
-
-
-MOST_DIMENSIONS = 6
-"""Axes of one grid: a pose has six coordinates."""
-POSE_FORMS = (
-    "give a DataFrame or a dictionary with a column for each field that changes, an array with a column for each "
-    "coordinate of the pose, an xarray Dataset, or the path of a CSV file"
-)
-"""The end of messages about poses in no form that is read."""
 
 
 def given_poses(machine: Machine, poses: Any) -> PoseColumns:
@@ -276,19 +262,6 @@ def _columns_of_array(machine: Machine, poses: Any) -> list[GivenColumn]:
     return [GivenColumn(name, values) for name, values in zip(coordinates, array.T, strict=True)]
 
 
-LARGEST_POSE_FILE = 1 << 30
-"""Bytes of a file of poses, 1 GiB: the text is kept in memory, in several copies."""
-MOST_POSE_COLUMNS = 1000
-"""Columns of a file of poses, several times the fields of a machine."""
-SEPARATORS = (";", "\t", ",")
-"""Signs between columns, in the order in which they are looked for: beside a semicolon, a comma is the decimal sign."""
-ANSWERS = {"pose", "status", *QUANTITIES}
-"""Columns that `kinetostat path` writes beside the poses: its own files are read again without them."""
-_CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\x85\u2028\u2029]")
-"""Control characters. Python drops some of them from a number, and takes others for the end of a line."""
-_HEAD = re.compile(r"(.+?)\s*(?:\[(.*)\]|\((.*)\))?")
-
-
 def read_poses(machine: Machine, path: Path) -> PoseColumns:
     """Read poses from a CSV file.
 
@@ -313,115 +286,32 @@ def read_poses(machine: Machine, path: Path) -> PoseColumns:
     return replace(poses, unit_doubt=unit_doubt(machine, columns))
 
 
-MOST_MACHINE_LENGTHS = 50.0
-"""Characteristic lengths of a machine beyond which no coordinate of its pose is: a mm is a thousandth of a m."""
-
-
 def unit_doubt(machine: Machine, columns: Sequence[GivenColumn]) -> str:
     """Return a sentence on columns of a file without a unit whose numbers seem to be mm or deg; empty without any."""
-    coordinates = {p.shown: p.quantity.kind for p in parameters(machine.family) if p.path.startswith(POSE)}
+    kinds = {p.shown: p.quantity.kind for p in parameters(machine.family) if p.path.startswith(POSE)}
     sentences = []
     for kind, meant, unit in (("length", "mm", "m"), ("angle", "deg", "rad")):
-        bare = [c for c in columns if not c.unit and coordinates.get(c.name.removeprefix(POSE)) == kind]
-        numbers = [size for column in bare if (size := _numbers(column, COMPONENT)) is not None]
-        most = max((float(np.abs(size).max()) for size in numbers), default=0.0)
-        length = float(MachineState(machine).configuration.length) if kind == "length" and most > 1.0 else math.inf
-        if most > (2.0 * math.pi if kind == "angle" else MOST_MACHINE_LENGTHS * length):
+        bare = [c for c in columns if not c.unit and kinds.get(c.name.removeprefix(POSE)) == kind]
+        numbers = [plain for column in bare if (plain := _plain_numbers(column, COMPONENT)) is not None]
+        greatest = max((float(np.abs(plain).max()) for plain in numbers), default=0.0)
+        if greatest > _greatest_plausible(machine, kind, greatest):
             heads = ", ".join(f"{column.name} [{meant}]" for column in bare)
             sentences.append(
                 f"Numbers without a unit in the head of their column are taken as {unit}, so that the file reaches "
-                f"{most:g} {unit}; if they are {meant}, write {heads} in its first line."
+                f"{greatest:g} {unit}; if they are {meant}, write {heads} in its first line."
             )
     return " ".join(sentences)
 
 
-def columns_of(
-    path: Path, most: int = MOST_GIVEN_POSES, text: str | None = None
-) -> tuple[list[GivenColumn], list[int]]:
-    """Read the columns of a CSV file as texts with the units of their heads, and the number of each line below these.
+def _greatest_plausible(machine: Machine, kind: str, greatest: float) -> float:
+    """The greatest length (m) or angle (rad) that a coordinate may have without doubt.
 
-    Args:
-        path: path of the file.
-        most: lines below the heads that it may have.
-        text: text of the file, where it is known; the path then only names it in messages.
-
-    Raises:
-        InputError: the file cannot be read or holds no lines below its heads, it has too many lines or columns, or a
-            line is too short or too long.
+    The machine is placed only where the greatest of a file is more than 1 m: one of less is small enough for its size
+    not to be asked for.
     """
-    lines = _lines(path, _text(path) if text is None else text)
-    if len(lines) < 2:
-        what = "is empty" if not lines else "names columns, but has no poses below them"
-        raise InputError(f'"{path}" {what}; write a line such as x [mm], y [mm], and below it a line for each pose.')
-    separator = next((sign for sign in SEPARATORS if sign in lines[0][1]), ",")
-    width = lines[0][1].count(separator) + 1
-    for count, bound, what in ((len(lines) - 1, most, "poses"), (width, MOST_POSE_COLUMNS, "columns")):
-        if count > bound:
-            raise InputError(f'"{path}" has {count:,} {what}, and may have at most {bound:,}; leave some out.')
-    heads_row, *rows = (_cells(path, number, line, separator) for number, line in lines)
-    numbers = [number for number, _ in lines[1:]]
-    for number, cells in zip(numbers, rows, strict=True):
-        if len(cells) != len(heads_row):
-            raise InputError(
-                f'"{path}", line {number}: the number of values is {len(cells)}, not {len(heads_row)} as above.'
-            )
-    heads = [_head(path, text) for text in heads_row]
-    repeated = next((name for name, times in Counter(name for name, _ in heads).items() if times > 1), None)
-    if repeated is not None:
-        raise InputError(f'"{path}": several columns are called {shorten(repeated)}; keep one of them.')
-    columns = [
-        GivenColumn(name, [_decimal(cell, separator) for cell in cells], unit)
-        for (name, unit), cells in zip(heads, zip(*rows, strict=True), strict=True)
-    ]
-    return columns, numbers
-
-
-def _cells(path: Path, number: int, line: str, separator: str) -> list[str]:
-    try:
-        return next(csv.reader([line], delimiter=separator, skipinitialspace=True))
-    except csv.Error as error:
-        raise InputError(f'"{path}", line {number} cannot be read: {error}; correct it, or remove it.') from None
-
-
-def _decimal(cell: str, separator: str) -> str:
-    return cell if separator == "," else cell.replace(",", ".")
-
-
-def _text(path: Path) -> str:
-    try:
-        with path.open("rb") as stream:
-            data = stream.read(LARGEST_POSE_FILE + 1)
-    except OSError as error:
-        raise InputError(f'"{path}" cannot be read: {error.strerror}; give a CSV file of poses.') from None
-    except ValueError:
-        raise InputError(f'"{path}" cannot be read: it has a null character; give a CSV file of poses.') from None
-    if len(data) > LARGEST_POSE_FILE:
-        raise InputError(f'"{path}" is larger than 1 GiB; split it into parts.')
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f'"{path}" is not text; give a CSV file of poses, saved as UTF-8.') from None
-
-
-def _lines(path: Path, text: str) -> list[tuple[int, str]]:
-    """Return the lines that hold something, each with its number in the file."""
-    control = _CONTROL.search(text)
-    if control is not None:
-        line = text.count("\n", 0, control.start()) + 1
-        raise InputError(
-            f'"{path}", line {line} has the control character {control[0]!r}, which no number and no name has; remove '
-            "it, or save the file as CSV again."
-        )
-    lines = enumerate(text.splitlines(), 1)
-    return [(number, line) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
-
-
-def _head(path: Path, text: str) -> tuple[str, str]:
-    """Return the name and the unit in a heading, "x [mm]" or "x (mm)"."""
-    match = _HEAD.fullmatch(text.strip())
-    if match is None:
-        raise InputError(f'"{path}": a column is called {shorten(text)}; write its name, with a unit, e.g. x [mm].')
-    return match[1], match[2] or match[3] or ""
+    if kind == "angle":
+        return 2.0 * math.pi
+    return MOST_MACHINE_LENGTHS * float(MachineState(machine).configuration.length) if greatest > 1.0 else math.inf
 
 
 def chosen_axes(machine: Machine, ranges: Sequence[str]) -> list[tuple[Range, Parameter]]:

@@ -1,19 +1,24 @@
-"""Names of quantities as people write them, and refusals of quantities that have no value for a machine.
+"""Quantities as people write them: their names, conditions on their values, and refusals where a machine has none.
 
-Everything here follows from the machine's file and from the places of its legs: no stiffness is computed.
+Everything here follows from texts, from the machine's file and from the places of its legs: no stiffness is computed. A
+condition compares a quantity with a value, "free_stiffness_z > 20 N/um".
 """
 
 import difflib
+import math
+import operator
+import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cache
 
 import numpy as np
 
 from kinetostat.algebra.screw import COMPONENTS
-from kinetostat.arrays import Array
+from kinetostat.arrays import Array, Mask
 from kinetostat.equilibrium.cables import cable_signs
 from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.equilibrium.state import MachineState, state_of
+from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.drive_limits import drive_limits, driven_springs
 from kinetostat.kinetostatics.quantities import CARRYING, GROUPS, MOST_CABLES, QUANTITIES, needs_masses, rest_numbers
 from kinetostat.machine.actuators import values_of_drives
@@ -23,9 +28,9 @@ from kinetostat.machine.loads import moving_masses, platform_is_loaded
 from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import Parameter, values, with_values
 from kinetostat.spec.arguments import as_list
-from kinetostat.spec.errors import InputError
+from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.renamed import current_name
-from kinetostat.units import KINDS
+from kinetostat.units import KINDS, UnitError, parse
 
 TENSIONS = GROUPS["tension"]
 """Quantities that are tensions, cable by cable."""
@@ -33,6 +38,33 @@ ACTUATOR_LOADS = tuple(limit.name for limit in LIMITS.values() if limit.about is
 """Quantities that are loads of actuators, which the table of limits names."""
 LOADING_KINDS = ("force", "acceleration", "density", "linear density", "temperature difference", "thermal expansion")
 """Kinds of parameters that may bring in a load which an answer to first order leaves out."""
+LOST_MOTION = ("backlash", "angular_backlash", "rotor_friction", "guide_friction", "bearing_friction")
+"""Fields of [drives] by which drives lose motion."""
+LIMITS_OF_LINEAR_DRIVES = {"load": ("limits.actuator_force", '"2 kN"'), "speed": ("limits.actuator_speed", '"0.5 m/s"')}
+"""The fields that limit linear drives, each with an example, by what they limit."""
+LIMITS_OF_ROTARY_DRIVES = {
+    "load": ("limits.actuator_moment", '"20 N*m"'),
+    "speed": ("limits.actuator_turning_speed", '"3 rad/s"'),
+}
+"""The same of rotary drives."""
+COMPARISONS = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}
+"""Comparisons of a condition, and their functions."""
+CONDITION_FORM = 'write QUANTITY < VALUE or QUANTITY > VALUE, e.g. "free_stiffness_z > 20 N/um"'
+"""The end of messages about a text that is not a condition."""
+LONGEST_CONDITION = 200
+"""Characters of a condition; a longer text is refused unread."""
+_CONDITION = re.compile(r"\s*([a-z_]+(?:_\d+)?)\s*(<=|>=|<|>)\s*([^<>=]+?)\s*")
+"""A condition: quantity, comparison and value."""
+COMPARED_KINDS = (
+    "length", "angle", "force", "moment", "mass", "frequency", "speed", "rate", "acceleration", "angular acceleration",
+)  # fmt: skip
+"""Kinds of quantities beside stiffnesses and compliances, of which several have one unit."""
+KIND_OF_UNIT = {
+    kind.unit: kind.name
+    for kind in KINDS.values()
+    if kind.name.endswith(("stiffness", "compliance")) or kind.name in COMPARED_KINDS
+}
+"""Kind of the value with which a quantity of a unit is compared; values of other units are plain numbers."""
 
 
 def uncounted_loads(state: MachineState, names: Collection[str], varied: Iterable[tuple[Parameter, Array]] = ()) -> str:
@@ -48,10 +80,10 @@ def uncounted_loads(state: MachineState, names: Collection[str], varied: Iterabl
     """
     if names and all(QUANTITIES[name].loaded for name in names):
         return ""
-    bringing = [(parameter, row) for parameter, row in varied if parameter.quantity.kind in LOADING_KINDS]
-    brought = {leaf: float(row[np.abs(row).argmax()]) for parameter, row in bringing for leaf in parameter.leaves}
+    loading = [(parameter, row) for parameter, row in varied if parameter.quantity.kind in LOADING_KINDS]
+    greatest = {leaf: float(row[np.abs(row).argmax()]) for parameter, row in loading for leaf in parameter.leaves}
     try:
-        return (state_of(with_values(state.machine, brought)) if brought else state).left_out
+        return (state_of(with_values(state.machine, greatest)) if greatest else state).left_out
     except InputError:  # links get warmer, but no expansion is given: an effect that is unknown cannot be left out
         return state.left_out
 
@@ -96,8 +128,8 @@ def _no_quantity(name: str, groups: Mapping[str, Sequence[str]], components: Seq
     """Say that there is no such quantity, and name the one that was probably meant, or all."""
     members = [member for group in groups.values() for member in group]
     others = [other for other, quantity in QUANTITIES.items() if not quantity.components and other not in members]
-    matrix, _, parts = name.partition("_")
-    swapped = "_".join([matrix, *reversed(parts.split("_"))])  # compliance_x_ry is written compliance_ry_x
+    matrix, _, entry = name.partition("_")
+    swapped = "_".join([matrix, *reversed(entry.split("_"))])  # compliance_x_ry is written compliance_ry_x
     if swapped != name and swapped in QUANTITIES and _exists(swapped, components):
         near = [swapped]
     else:
@@ -114,6 +146,81 @@ def _no_quantity(name: str, groups: Mapping[str, Sequence[str]], components: Seq
 def _exists(name: str, components: Sequence[str]) -> bool:
     """Whether all components that a quantity is about exist."""
     return all(part in components for part in QUANTITIES[name].components)
+
+
+@dataclass(frozen=True)
+class PoseCondition:
+    """A quantity compared with a value.
+
+    Attributes:
+        text: the condition as written, with single spaces.
+        quantity: name of the quantity.
+        comparison: "<", "<=", ">" or ">=".
+        value: the value with which it is compared, SI.
+    """
+
+    text: str
+    quantity: str
+    comparison: str
+    value: float
+
+    @property
+    def wants_more(self) -> bool:
+        """Whether greater values are better: the comparison is > or >=."""
+        return self.comparison.startswith(">")
+
+    def holds(self, values: Array) -> Mask:
+        """Tell at which points the quantity, given in SI, meets the condition; where it is NaN, it does not."""
+        return np.asarray(COMPARISONS[self.comparison](values, self.value))
+
+
+def parse_condition(text: str, components: Sequence[str]) -> PoseCondition:
+    """Read a condition from text.
+
+    Args:
+        text: "QUANTITY < VALUE".
+        components: components that the machine has.
+
+    Raises:
+        InputError: not of that form, an unknown quantity, or a value of another kind.
+    """
+    match = _CONDITION.fullmatch(text) if len(text) <= LONGEST_CONDITION else None
+    if match is None:
+        raise InputError(f"{shorten(text)} is not a condition; {CONDITION_FORM}.")
+    quantity, comparison, written = match.groups()
+    name = current_name(quantity, "quantity")
+    if name in GROUPS:
+        raise InputError(f'"{name}" stands for several quantities; name one of {", ".join(GROUPS[name])}.')
+    resolve_quantities([name], components)
+    value = value_of(QUANTITIES[name].unit, written, f"the condition on {name}")
+    return PoseCondition(f"{name} {comparison} {written}", name, comparison, value)
+
+
+def value_of(unit: str, written: float | str | None, where: str) -> float:
+    """Read the value, SI, with which a quantity of some unit is compared; `where` it is written goes into messages.
+
+    Raises:
+        InputError: it is of another kind, or not finite.
+    """
+    try:
+        if unit in KIND_OF_UNIT:
+            return _finite(parse(written, KIND_OF_UNIT[unit]))
+        return _finite(float(written if written is not None else math.nan))
+    except UnitError as error:
+        raise InputError(f"in {where}, {shorten(written)}: {error}.") from None
+    except ValueError:
+        raise InputError(f"in {where}, {shorten(written)} must be a plain number, e.g. 0.05.") from None
+
+
+def _finite(value: float) -> float:
+    """The value, unless it is infinite or not a number.
+
+    Raises:
+        UnitError: it is.
+    """
+    if not np.isfinite(value):
+        raise UnitError('no condition can ask for "rigid"; give a large value')
+    return value
 
 
 def usual_quantities(machine: Machine, usual: str) -> list[str]:
@@ -199,10 +306,6 @@ def refuse_absent(state: MachineState, names: Sequence[str], varied: Sequence[Pa
             )
 
 
-LOST_MOTION = ("backlash", "angular_backlash", "rotor_friction", "guide_friction", "bearing_friction")
-"""Fields of [drives] by which drives lose motion."""
-
-
 def _refuse_without_lost_motion(state: MachineState, name: str, varied: Sequence[Parameter]) -> None:
     """Refuse a reversal error of a machine whose file gives neither play of drives nor friction."""
     numbers_of_lost_motion = [
@@ -218,13 +321,6 @@ def _refuse_without_lost_motion(state: MachineState, name: str, varied: Sequence
         )
 
 
-LIMITS_OF_DRIVES = {
-    "load": {True: ("limits.actuator_force", '"2 kN"'), False: ("limits.actuator_moment", '"20 N*m"')},
-    "speed": {True: ("limits.actuator_speed", '"0.5 m/s"'), False: ("limits.actuator_turning_speed", '"3 rad/s"')},
-}
-"""By what is limited of a drive, and by whether the drive is linear: the field that limits it, with an example."""
-
-
 def _refuse_unlimited_drives(state: MachineState, names: Sequence[str], varied: Sequence[Parameter]) -> None:
     """Refuse quantities about what drives can do where the file of a machine limits none of them."""
     driven, chosen = [name for name in names if QUANTITIES[name].driven], [parameter.path for parameter in varied]
@@ -236,8 +332,9 @@ def _refuse_unlimited_drives(state: MachineState, names: Sequence[str], varied: 
             continue
         drives = drive_limits(state.machine, state.configuration)
         limited = "load" if limited in CARRYING else limited
-        linear = sorted({drive.spring.joint.point is None for drive in drives}, reverse=True)
-        fields = dict(LIMITS_OF_DRIVES[limited][is_linear] for is_linear in linear)
+        are_linear = {drive.spring.joint.point is None for drive in drives}
+        tables = [LIMITS_OF_LINEAR_DRIVES] * (True in are_linear) + [LIMITS_OF_ROTARY_DRIVES] * (False in are_linear)
+        fields = dict(table[limited] for table in tables)
         bounded = limited == "load" and any(np.isfinite(drive.lower) for drive in drives)
         if not bounded and all(field not in chosen and np.isinf(given[field]) for field in fields):
             examples = " and ".join(f"{field} = {example}" for field, example in fields.items()) or "an actuator"

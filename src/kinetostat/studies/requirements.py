@@ -26,10 +26,10 @@ from kinetostat.spec.document import parse
 from kinetostat.spec.errors import InputError, choice
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.requirements import Requirement
+from kinetostat.studies.csv_columns import GivenColumn
 from kinetostat.studies.evaluation import point_of_file
-from kinetostat.studies.pose_conditions import PoseCondition, parse_condition
-from kinetostat.studies.poses import GivenColumn, chosen_axes, grid_of, read_columns
-from kinetostat.studies.quantities import refuse_absent
+from kinetostat.studies.poses import chosen_axes, grid_of, read_columns
+from kinetostat.studies.quantities import PoseCondition, parse_condition, refuse_absent
 
 if TYPE_CHECKING:
     from kinetostat.studies import motions, motors

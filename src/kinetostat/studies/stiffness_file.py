@@ -16,8 +16,8 @@ from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError, shorten
+from kinetostat.studies.csv_columns import GivenColumn, columns_of
 from kinetostat.studies.identification.measurements import Measurements, Sigmas, read_measurements
-from kinetostat.studies.poses import GivenColumn, columns_of
 from kinetostat.units import KINDS, UnitError, parse
 
 COLUMNS = ("entry", "value", "sigma")

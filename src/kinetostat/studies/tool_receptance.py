@@ -15,7 +15,8 @@ from kinetostat.algebra.screw import COMPONENTS
 from kinetostat.arrays import Array, Complex
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
-from kinetostat.studies.poses import GivenColumn, column_values, columns_of
+from kinetostat.studies.csv_columns import GivenColumn, columns_of
+from kinetostat.studies.poses import column_values
 from kinetostat.vibration.receptance import FreeTool
 
 _HEAD = re.compile(r"(tip|flange)\.(r?[xyz])\s*/\s*(tip|flange)\.(r?[xyz])\s+(real|imaginary)")

@@ -27,8 +27,8 @@ from kinetostat.spec.errors import InputError
 from kinetostat.spec.immutable import ImmutableAnswer
 from kinetostat.spec.renamed import former_names
 from kinetostat.studies.datasets import IN_MEMORY, LOADS_LEFT_OUT, GridQuestion, answer, grid_question
-from kinetostat.studies.pose_conditions import PoseCondition, parse_condition
 from kinetostat.studies.poses import MOST_DIMENSIONS
+from kinetostat.studies.quantities import PoseCondition, parse_condition
 from kinetostat.studies.workspace_verdicts import INSIDE, Demand, Judge, Poses, borders, demands
 
 COLOURING_QUANTITY = "least_translational_stiffness"

@@ -24,7 +24,7 @@ from kinetostat.kinetostatics.extremes import aspect
 from kinetostat.machine.limits import LIMITS, Limit, Limits, limits_set
 from kinetostat.machine.machine import Machine
 from kinetostat.studies.datasets import GridQuestion
-from kinetostat.studies.pose_conditions import PoseCondition
+from kinetostat.studies.quantities import PoseCondition
 from kinetostat.units import as_read
 
 Poses = dict[str, Array]

@@ -22,7 +22,7 @@ from kinetostat.machine.limits import Limits, no_limits_sentence
 from kinetostat.machine.parameters import dimension, shown
 from kinetostat.numerics.isosurface import surface
 from kinetostat.studies.datasets import field_of
-from kinetostat.studies.pose_conditions import PoseCondition
+from kinetostat.studies.quantities import PoseCondition
 from kinetostat.studies.workspace import (
     BORDER_VARIABLES,
     COLOURING_QUANTITY,

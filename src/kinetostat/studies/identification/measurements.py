@@ -17,7 +17,8 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, quantities
-from kinetostat.studies.poses import GivenColumn, Where, columns_of, read_columns
+from kinetostat.studies.csv_columns import GivenColumn, columns_of
+from kinetostat.studies.poses import Where, read_columns
 from kinetostat.units import UnitError
 
 POSITION, ROTATION, EULER = ("x", "y", "z"), ("rx", "ry", "rz"), ("roll", "pitch", "yaw")

@@ -22,8 +22,7 @@ from kinetostat.spec.study import ConstraintTable, ObjectiveTable, StudyFile, re
 from kinetostat.studies.bundled import bundled_studies, study_of
 from kinetostat.studies.optimisation.space import PoseSet, Space, read_poses, read_space
 from kinetostat.studies.optimisation.terms import Aggregate, Term, known_terms, parse_aggregate, read_term, usual_goal
-from kinetostat.studies.pose_conditions import value_of
-from kinetostat.studies.quantities import refuse_without_derivatives, without_derivatives
+from kinetostat.studies.quantities import refuse_without_derivatives, value_of, without_derivatives
 
 NOT_A_STUDY = (
     "is a machine, but this command takes a study, which names the machine and says what may change and what is "
