@@ -225,11 +225,7 @@ class Vibration(AnswerInState):
         return tried[(tried >= self.tool.frequencies[0]) & (tried <= self.tool.frequencies[-1])]
 
     def _solution(self) -> tuple[Modes, Damper]:
-        """All modes and their damping.
-
-        Raises:
-            InputError: the pose has no answer.
-        """
+        """All modes and their damping; an InputError where the pose has no answer."""
         if self.solution is None or self.damping is None:
             raise InputError(f"{self.machine.name} has no vibrations at this pose: {self.message}")
         return self.solution, self.damping
@@ -378,20 +374,16 @@ def _message(machine: Machine, response: Response, shown: Sequence[Mode]) -> str
 def _directions(machine: Machine, together: Sequence[Mode], length: float) -> list[str]:
     """As many components as there are modes: those in which all of them together move the tool most."""
     names = machine.family.component_names
-    scales = np.array([length if _is_rotation(name) else 1.0 for name in names])
+    scales = np.array([length if name.startswith("r") else 1.0 for name in names])
     sizes = np.linalg.norm([mode.tool for mode in together], axis=0) * scales
     return [names[place] for place in sorted(np.argsort(-sizes, kind="stable")[: len(together)])]
-
-
-def _is_rotation(component: str) -> bool:
-    return component.startswith("r")
 
 
 def _motions(components: Sequence[str]) -> str:
     """Components as motions: "moves along x", "turns about x and about y"."""
     phrases: list[str] = []
     for name in dict.fromkeys(components):
-        verb, way = ("turns", f"about {name[1:]}") if _is_rotation(name) else ("moves", f"along {name}")
+        verb, way = ("turns", f"about {name[1:]}") if name.startswith("r") else ("moves", f"along {name}")
         phrases.append(way if any(text.startswith(verb) for text in phrases) else f"{verb} {way}")
     return " and ".join(phrases)
 

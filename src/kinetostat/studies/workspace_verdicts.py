@@ -134,7 +134,7 @@ class Judge:
         return codes
 
     def _beyond_singularity(self, values: Mapping[str, Any]) -> Mask:
-        """Which poses are of the other aspect than the file's pose; none where that has no aspect."""
+        """Whether each pose is of the other aspect than the file's pose; none is where that has no aspect."""
         return np.asarray((np.asarray(values["aspect"]) * self.aspect) < 0.0)
 
 
