@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kinetostat import modes
-from kinetostat.exchange.formats import choose
+from kinetostat.exchange.formats import format_for
 from kinetostat.exchange.urdf_export import texts_of
 from kinetostat.exchange.urdf_file import parse
 from kinetostat.exchange.urdf_import import document_of, machine_text, read_machine
@@ -199,7 +199,7 @@ def test_the_file_is_a_urdf_for_others():
 
 
 def test_the_loops_stand_in_a_file_beside_it(tmp_path):
-    paths = choose("urdf", None).write(analyze(load("delta")), tmp_path / "delta.urdf")
+    paths = format_for("urdf", None).write(analyze(load("delta")), tmp_path / "delta.urdf")
     assert [path.name for path in paths] == ["delta.urdf", "delta.yaml"]
 
 

@@ -14,7 +14,7 @@ from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE, NO_ANSWER
 from kinetostat.commands.documents import EXPORT_FORMATS
 from kinetostat.exchange import solids
-from kinetostat.exchange.formats import KNOWN
+from kinetostat.exchange.formats import FORMATS
 from kinetostat.machine.loading import bundled
 from kinetostat.machine.parameters import with_values
 from kinetostat.spec.installation import extra_command
@@ -22,7 +22,7 @@ from kinetostat.spec.installation import extra_command
 MACHINE = "zhang-gosselin-4dof"
 
 
-FORMS = [pytest.param(one, marks=needs_cad if one.name == "step" else (), id=one.name) for one in KNOWN]
+FORMS = [pytest.param(one, marks=needs_cad if one.name == "step" else (), id=one.name) for one in FORMATS]
 
 WRITTEN_OF = {("inputs", "outputs"): "planar-3rpr", ("over",): "delta"}
 """By the options of a format. Programs have rest and command, which take long for larger machines: `test_c_source`,
@@ -41,7 +41,7 @@ def test_every_format_is_written(one, tmp_path, capsys):
 
 
 def test_help_names_every_format():
-    assert list(EXPORT_FORMATS) == [form.name for form in KNOWN]
+    assert list(EXPORT_FORMATS) == [form.name for form in FORMATS]
 
 
 def test_the_suffix_names_the_format_and_the_machine_the_file(tmp_path, monkeypatch):

@@ -50,6 +50,7 @@ def test_a_changed_machine_is_no_longer_the_bundled_one(served):
         (["nonesuch"], "neither a file nor a bundled machine"),
         (["--port", "0"], "not a port"),
         (["--port", "http"], "not a port"),
+        (["--port", "0080009999"], "not a port"),
     ],
 )
 def test_bad_input_is_one_paragraph(words, said, capsys):

@@ -11,7 +11,7 @@ import pytest
 from kinetostat.cli import main
 from kinetostat.commands.common import BAD_INPUT, DONE
 from kinetostat.commands.documents import REPORT_PARTS
-from kinetostat.exchange.formats import KNOWN, export
+from kinetostat.exchange.formats import FORMATS, export
 from kinetostat.machine.loading import load
 from kinetostat.studies import storage
 from kinetostat.studies.storage import PREFIX, scratch, write_text
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no limits, link
 MACHINE = "delta"
 HEAVY = ["--set", "tool.mass=2 kg", "--set", "tool.inertia=[0.01, 0.01, 0.02, 0, 0, 0]"]
 
-PROGRAMS = {form.suffix for form in KNOWN if form.options == ("inputs", "outputs")}
+PROGRAMS = {form.suffix for form in FORMATS if form.options == ("inputs", "outputs")}
 """Suffixes of formats that hold programs: these are long, and take long, for all but small machines."""
 
 
@@ -48,7 +48,7 @@ def tree(folder):
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
 
 
-@pytest.mark.parametrize("suffix", [form.suffix for form in KNOWN if form.name != "step"])
+@pytest.mark.parametrize("suffix", [form.suffix for form in FORMATS if form.name != "step"])
 def test_an_export_to_a_full_disk_is_one_sentence_and_leaves_nothing(suffix, tmp_path):
     machine = "planar-3rpr" if suffix in PROGRAMS else MACHINE
     with files_of_at_most(500), refused("cannot be written: it would exceed"):

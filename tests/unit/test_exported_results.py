@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 from scipy.io import loadmat
 
-from kinetostat.exchange.formats import KNOWN, choose
+from kinetostat.exchange.formats import FORMATS, format_for
 from kinetostat.machine.loading import as_toml, load
 from kinetostat.studies.analysis import analyze
 from refusals import refused
@@ -18,7 +18,7 @@ WITH_TOOL = ('tool.offset=["10 mm", "0 mm", "-80 mm"]',)
 
 def written(name, to, tmp_path, *settings):
     found = analyze(load(name, settings))
-    (path,) = choose(to, None).write(found, tmp_path / f"{name}.{to}")
+    (path,) = format_for(to, None).write(found, tmp_path / f"{name}.{to}")
     return found, path
 
 
@@ -74,13 +74,13 @@ def test_csv_has_a_number_a_line_with_its_unit(name, tmp_path):
 
 def test_results_say_of_what_and_where_they_hold(tmp_path):
     found = analyze(load("hexapod", ["tool.offset=[0, 0, 0.08]"]), axes="platform")
-    (table,) = choose("csv", tmp_path / "found.csv").write(found, tmp_path / "found.csv")
+    (table,) = format_for("csv", tmp_path / "found.csv").write(found, tmp_path / "found.csv")
     with table.open(encoding="utf-8", newline="") as file:
         about = {row["row"]: row["column"] for row in csv.DictReader(file) if row["quantity"] == "about"}
     assert about["machine"] == found.machine.name
     assert about["frame"] == "platform axes at the tool point T"
     assert about["kinetostat"] == version("kinetostat")
-    (file,) = choose("netcdf", tmp_path / "found.nc").write(found, tmp_path / "found.nc")
+    (file,) = format_for("netcdf", tmp_path / "found.nc").write(found, tmp_path / "found.nc")
     with xr.open_dataset(file) as told:
         assert told.attrs["machine_file"] == as_toml(found.machine)
         assert told.attrs["frame"] == about["frame"]
@@ -114,18 +114,18 @@ def test_matlab_has_no_matrix_where_there_is_none(tmp_path):
     assert data["C"].shape == (6, 6)
 
 
-@pytest.mark.parametrize("one", KNOWN, ids=lambda one: one.name)
+@pytest.mark.parametrize("one", FORMATS, ids=lambda one: one.name)
 def test_a_format_is_found_by_name_and_by_suffix(one, tmp_path):
-    assert choose(one.name, None) is one
-    first = next(other for other in KNOWN if other.suffix == one.suffix)
-    assert choose(None, tmp_path / f"machine{one.suffix}") is first
+    assert format_for(one.name, None) is one
+    first = next(other for other in FORMATS if other.suffix == one.suffix)
+    assert format_for(None, tmp_path / f"machine{one.suffix}") is first
 
 
 def test_an_unknown_format_is_refused(tmp_path):
     with refused('"mjfc"; did you mean "mjcf"'):
-        choose("mjfc", None)
+        format_for("mjfc", None)
     with refused(r"one of these suffixes: .*mjcf \(\.xml\)"):
-        choose(None, tmp_path / "machine.sldprt")
+        format_for(None, tmp_path / "machine.sldprt")
 
 
 @pytest.mark.parametrize("name", ['=HYPERLINK("x")', "+sum", "-cmd", "@sum"])

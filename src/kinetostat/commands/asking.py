@@ -1,8 +1,8 @@
 """Any question as a command: its options, its answer on the terminal, and the files of a folder. No formula lives here.
 
-The options of a question are added when its command is used, so that `kinetostat --help` imports no question. Two are
-asked with more options: `sweep` and `map` may take many processes, and a grid that does not fit in memory is answered
-chunk by chunk into the output folder (`studies.stored_grid`), where it can be stopped and resumed.
+The options of a question are added when its command is used, so that `kinetostat --help` imports no question. Two
+commands, `sweep` and `map`, have options of their own: their grids may be shared among processes, and one that does not
+fit in memory is computed chunk by chunk into the output folder (`studies.stored_grid`), where it can be resumed.
 """
 
 import argparse
@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kinetostat.commands.common import (
+    MOST_DIGITS,
     NO_ANSWER,
     Help,
     Parser,
@@ -22,12 +23,13 @@ from kinetostat.commands.common import (
     load_machine,
     note_damage,
     print_result,
+    progress_bar,
     say_stopped,
-    search_bar,
     takes_figures,
     takes_json,
     takes_loaded,
     takes_machine,
+    whole_number,
     write_figures,
 )
 from kinetostat.spec.errors import InputError, choice
@@ -48,8 +50,6 @@ if TYPE_CHECKING:
     from kinetostat.studies.tensions import Carrying
     from kinetostat.views.question import Description
 
-LONGEST_COUNT = 9
-"""Digits of the whole numbers that options take: a billion of anything would never end."""
 MOST_WORKERS = 1024
 """Greatest number of processes that may be asked for: more than any machine has cores, so that more is a mistake."""
 
@@ -58,7 +58,7 @@ def add_question(
     commands: "Commands",
     word: str,
     run: "Callable[[Question, argparse.Namespace], int] | None" = None,
-    more: "Callable[[Parser], None]" = lambda _command: None,
+    add_further_options: "Callable[[Parser], None]" = lambda _command: None,
 ) -> None:
     """Add the command of a question; its options follow when it is used.
 
@@ -66,18 +66,18 @@ def add_question(
         commands: the commands to which it is added.
         word: the word of the question.
         run: runs the command with its options and returns the exit code; `ask` if None.
-        more: adds options that the command alone has.
+        add_further_options: adds options that the question has on the command line alone.
     """
-    summary, where = QUESTIONS[word]
+    summary, place = QUESTIONS[word]
     command = commands.add_parser(word, help=summary, formatter_class=Help)
 
-    def fill(command: Parser) -> None:
-        question: Question = late(where)
-        _fill(command, summary, question)
-        more(command)
+    def add_options(command: Parser) -> None:
+        question: Question = late(place)
+        _add_options(command, summary, question)
+        add_further_options(command)
         command.set_defaults(run=partial(run or ask, question))
 
-    command.later = fill
+    command.later = add_options
 
 
 def add_other_questions(commands: "Commands") -> None:
@@ -87,7 +87,8 @@ def add_other_questions(commands: "Commands") -> None:
             add_question(commands, word)
 
 
-def _fill(command: Parser, summary: str, question: Question) -> None:
+def _add_options(command: Parser, summary: str, question: Question) -> None:
+    """Give a command the description and the options of a question."""
     command.description = f"{summary[0].upper()}{summary[1:]}."
     command.epilog = f"example:\n  {question.example}\n"
     command.set_defaults(doing=question.slow)
@@ -108,7 +109,7 @@ def _fill(command: Parser, summary: str, question: Question) -> None:
 
 
 def _add_option(command: Parser, option: Option) -> None:
-    """Add an option, or what stands after the machine without a name; its settings are those of `add_argument`."""
+    """Add an option, or a word that stands after the machine; `settings` are those of argparse's `add_argument`."""
     settings: dict[str, Any] = {"help": option.meaning}
     if option.kind == "flag":
         command.add_argument(option.flag, action="store_true", dest=option.name, **settings)
@@ -127,12 +128,14 @@ def _add_option(command: Parser, option: Option) -> None:
         return
     command.add_argument(option.flag, dest=option.name, required=option.required, **settings)
     for former in option.former:
-        settings |= {"help": argparse.SUPPRESS, "action": partial(_Former, option.flag), "default": argparse.SUPPRESS}
+        settings |= {
+            "help": argparse.SUPPRESS, "action": partial(_FormerName, option.flag), "default": argparse.SUPPRESS,
+        }  # fmt: skip
         command.add_argument(former, dest=option.name, **settings)
 
 
-class _Former(argparse.Action):
-    """An earlier word of an option: it works, and says what the option is called now."""
+class _FormerName(argparse.Action):
+    """A former name of an option: it works, and says what the option is called now."""
 
     def __init__(self, current: str, **options: Any) -> None:
         super().__init__(**options)
@@ -144,9 +147,7 @@ class _Former(argparse.Action):
 
 
 def _count(text: str) -> int:
-    if not text.isdecimal() or len(text) > LONGEST_COUNT:
-        raise argparse.ArgumentTypeError(f"{text} is not a number; give a whole number of at most nine digits")
-    return int(text)
+    return whole_number(text, f"a number; give a whole number of at most {MOST_DIGITS} digits")
 
 
 READERS = {"direction": direction, "count": _count, "number": float, "file": Path}
@@ -170,12 +171,12 @@ def ask(question: Question, options: argparse.Namespace) -> int:
     machine = load_machine(options, overrides)
     try:
         if question.reports_progress:
-            with search_bar(question.slow) as update:
-                answer = question.answer(machine, **arguments, progress=partial(_advance, update))
+            with progress_bar(question.slow) as progress:
+                answer = question.answer(machine, **arguments, progress=progress)
         else:
             answer = question.answer(machine, **arguments)
     except InputError as error:
-        raise InputError(_in_words(question, str(error))) from None
+        raise InputError(_with_flag(question, str(error))) from None
     return show_answer(options, answer, to_files=bool(question.suffixes))
 
 
@@ -183,7 +184,7 @@ def show_answer(options: argparse.Namespace, answer: Any, to_files: bool = False
     """Write the files of an answer where the options name a place, and print it.
 
     Args:
-        options: the options of the command.
+        options: the options of the command; `output` and `full` count as not given where the command has none.
         answer: an answer of a kind that has a description.
         to_files: whether `--output` is a list of files instead of a folder.
 
@@ -215,16 +216,11 @@ def show_answer(options: argparse.Namespace, answer: Any, to_files: bool = False
     return code if description.kept(answer) else NO_ANSWER
 
 
-def _advance(update: "Callable[[int, int, str], None]", done: int, total: int, words: str = "") -> None:
-    """Show how far the work is, and a few words on its state where there are any."""
-    update(done, total, words)
-
-
-def _in_words(question: Question, message: str) -> str:
-    """Return a message that begins with an argument of Python, in the words of the command line."""
-    first, space, rest = message.partition(" ")
+def _with_flag(question: Question, message: str) -> str:
+    """Return a message with the option of the command line for the argument of Python with which it may begin."""
+    first_word, space, rest = message.partition(" ")
     flags = {option.name: option.flag for option in question.options if not option.first}
-    return f"{flags.get(first, first)}{space}{rest}"
+    return f"{flags.get(first_word, first_word)}{space}{rest}"
 
 
 def _write_named_files(options: argparse.Namespace, description: "Description", answer: Any) -> list[Path]:
@@ -233,8 +229,8 @@ def _write_named_files(options: argparse.Namespace, description: "Description", 
 
     paths: list[Path] = options.output
     for path in paths:
-        picture = path.suffix.lower() in FIGURE_SUFFIXES
-        save(next(iter(drawings_of(description, answer).values()))() if picture else answer, path)
+        is_picture = path.suffix.lower() in FIGURE_SUFFIXES
+        save(next(iter(drawings_of(description, answer).values()))() if is_picture else answer, path)
     return paths
 
 
@@ -269,9 +265,7 @@ def _add_grid_options(command: Parser) -> None:
 
 
 def _workers(text: str) -> int:
-    if not text.isdecimal() or len(text) > LONGEST_COUNT or not 1 <= int(text) <= MOST_WORKERS:
-        raise argparse.ArgumentTypeError(f"{text} is not a number of processes; give 1 to {MOST_WORKERS}")
-    return int(text)
+    return whole_number(text, f"a number of processes; give 1 to {MOST_WORKERS}", 1, MOST_WORKERS)
 
 
 def _ask_grid(word: str, question: Question, options: argparse.Namespace) -> int:
@@ -296,7 +290,10 @@ def _answer_grid(
     quantities: "Sequence[str]" = (),
     carrying: bool = False,
 ) -> "xr.Dataset | Carrying | StoredGrid":
-    """Compute a grid by the processes that are wanted: in memory, or into the folder if it is too large for that."""
+    """Compute a grid by as many processes as the options say: in memory, or into the folder if it is too large.
+
+    What `ask` passes by name, `machine` to `carrying`, are the arguments of the question itself.
+    """
     from kinetostat.engine.chunks import Crew, compute_with
     from kinetostat.studies.datasets import answer
     from kinetostat.views.grid import CARRYING_ALONE, map_question, sweep_question
@@ -304,8 +301,8 @@ def _answer_grid(
     if carrying:
         if options.workers or options.cluster or options.resume:
             raise InputError(CARRYING_ALONE)
-        answered: Carrying = question.answer(machine, ranges, progress, quantities, carrying)
-        return answered
+        carried: Carrying = question.answer(machine, ranges, progress, quantities, carrying)
+        return carried
     grid_question = (sweep_question if word == "sweep" else map_question)(machine, ranges, quantities)
     with compute_with(Crew(options.workers, options.cluster)) as compute:
         if options.output and not grid_question.fits_memory:
@@ -328,7 +325,7 @@ def _check_folder(folder: Path, resume: bool) -> None:
 def _answer_into_folder(
     options: argparse.Namespace, question: "GridQuestion", word: str, progress: "Progress", compute: "Compute"
 ) -> "StoredGrid":
-    """Compute a large grid into the folder, or go on with it, and say what was repaired and written there."""
+    """Compute a large grid into the folder, or continue the one there, and say what was repaired and written."""
     from kinetostat.studies.storage import differing
     from kinetostat.studies.stored_grid import answer_into
     from kinetostat.studies.study_folder import COPY, HISTORY, QUESTION

@@ -11,7 +11,7 @@ import textwrap
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, Protocol
 
 from kinetostat.late import leave_out_property_lists, postpone_glyph_names
 from kinetostat.spec.installation import as_typed
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import Console
 
-    from kinetostat.engine.batch import Progress
     from kinetostat.machine.machine import Machine
     from kinetostat.views.question import Description, Drawing
 
@@ -31,16 +30,17 @@ if TYPE_CHECKING:
 
 DONE, NO_ANSWER, BAD_INPUT, STOPPED = 0, 1, 2, 130
 """Exit codes; the last is that of shells for what Ctrl-C has ended."""
-
-MACHINE = "a machine file, or the name of a bundled machine (see `kinetostat list`)"
-
+MACHINE_HELP = "a machine file, or the name of a bundled machine (see `kinetostat list`)"
+MOST_DIGITS = 9
+"""Digits of the whole numbers that options take: a billion of anything would never end."""
+FIGURE_FORMATS = ("png", "svg", "pdf")
+"""Formats in which a command writes figures, the usual one first."""
+FILE_SUFFIXES = {".csv", ".html", ".json", ".nc", ".pdf", ".png", ".svg", ".toml"}
+"""Suffixes by which `--output` means a file, although a folder may have any name."""
 PROGRESS_SECONDS = 600.0
-"""Time of progress from which the remaining time is estimated: several chunks, even where each takes minutes."""
-
+"""Seconds of progress of which the remaining time is estimated: several chunks, even where each takes minutes."""
 _WORDS = re.compile(r"""(?:-[\w-]+ (?!-))?(?:[^\s"']|"[^"]*"|'[^']*')+""")
 """Words of a command: an option with its value, what stands in quotes, or any other word."""
-
-
 BESIDE_WORDS = 5
 """Characters of a line of an example besides its words: three blanks before the last, and a blank and a backslash."""
 
@@ -110,15 +110,15 @@ def add_command(commands: "Commands", name: str, run: object, text: str, example
     return command
 
 
-def takes_machine(command: Parser, meaning: str = MACHINE) -> None:
-    """Give a command the machine and `--set`."""
-    command.add_argument("machine", metavar="MACHINE", help=meaning)
+def takes_machine(command: Parser, meaning: str = MACHINE_HELP, default: str | None = None) -> None:
+    """Give a command the machine, which must be named if there is no default, with `--set` and `--units`."""
+    command.add_argument("machine", metavar="MACHINE", nargs="?" if default else None, default=default, help=meaning)
     takes_settings(command, 'override a field, e.g. --set geometry.base_radius="26 cm"; repeatable')
     takes_units(command)
 
 
 def takes_loaded(command: Parser, meaning: str) -> None:
-    """Give a command `--loaded`, which wants what `state = "loaded"` in [load] wants."""
+    """Give a command `--loaded`, which does for one call what `state = "loaded"` in [load] does for a file."""
     command.add_argument(
         "--loaded", action="store_true", help=f'{meaning} (default where [load] says state = "loaded")'
     )
@@ -146,12 +146,8 @@ def takes_ranges(command: Parser, meaning: str) -> None:
 
 
 def takes_output(command: Parser, contents: str) -> None:
-    """Give a command `--output`, a folder."""
+    """Give a command `--output`, a folder, which may be given once."""
     command.add_argument("-o", "--output", type=_folder, action=_Once, help=f"folder for {contents}")
-
-
-FILE_SUFFIXES = {".csv", ".html", ".json", ".nc", ".pdf", ".png", ".svg", ".toml"}
-"""Suffixes by which `--output` means a file, although a folder may have any name."""
 
 
 def _folder(text: str) -> Path:
@@ -177,20 +173,20 @@ def takes_figures(command: Parser, contents: str) -> None:
     """Give a command `--output` and `--formats`."""
     takes_output(command, contents)
     command.add_argument(
-        "--formats", metavar="LIST", type=_formats, default=("png",),
-        help="formats of the figures, separated by commas: png, svg, pdf (default: png)",
+        "--formats", metavar="LIST", type=_formats, default=FIGURE_FORMATS[:1],
+        help=f"formats of the figures, separated by commas: {', '.join(FIGURE_FORMATS)} (default: {FIGURE_FORMATS[0]})",
     )  # fmt: skip
 
 
 def _formats(text: str) -> tuple[str, ...]:
     formats = tuple(dict.fromkeys(part.strip().lower().removeprefix(".") for part in text.split(",")))
-    if not set(formats) <= {"png", "svg", "pdf"}:
-        raise argparse.ArgumentTypeError(f"{text} is not a list of formats; give some of png,svg,pdf")
+    if not set(formats) <= set(FIGURE_FORMATS):
+        raise argparse.ArgumentTypeError(f"{text} is not a list of formats; give some of {','.join(FIGURE_FORMATS)}")
     return formats
 
 
 def drawings_of(description: "Description", answer: object) -> "dict[str, Drawing]":
-    """Return the figures of an answer, in a process that writes them and ends."""
+    """Return the figures of an answer, and prepare Matplotlib for a process that writes them and ends."""
     if description.figures:
         leave_out_property_lists()
         postpone_glyph_names()
@@ -209,8 +205,8 @@ def write_figures(options: argparse.Namespace, drawings: "Mapping[str, Callable[
     """
     from kinetostat.views.figures import save
 
-    with search_bar("drawing") as update:
-        return save(drawings, options.output, options.formats, update)
+    with progress_bar("drawing") as progress:
+        return save(drawings, options.output, options.formats, progress)
 
 
 def direction(text: str) -> tuple[float, ...]:
@@ -220,6 +216,20 @@ def direction(text: str) -> tuple[float, ...]:
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text} is not a direction; give three numbers, e.g. 0,0,1") from None
     return x, y, z
+
+
+def whole_number(text: str, refusal: str, least: int = 0, most: int = 10**MOST_DIGITS - 1) -> int:
+    """Read a whole number between two bounds as an option of the command line.
+
+    Args:
+        text: the word of the option.
+        refusal: follows the word if it is no such number: "a port; give a number from 1 to 65535".
+        least: the least number allowed.
+        most: the greatest number allowed.
+    """
+    if not text.isdecimal() or len(text) > MOST_DIGITS or not least <= int(text) <= most:
+        raise argparse.ArgumentTypeError(f"{text} is not {refusal}")
+    return int(text)
 
 
 def takes_json(command: Parser) -> None:
@@ -246,15 +256,15 @@ def load_machine(options: argparse.Namespace, more: "Sequence[str]" = ()) -> "Ma
 
 
 def as_wanted(options: argparse.Namespace, machine: "Machine") -> "Machine":
-    """Return a machine with the units of `--units`, and under its loads where `--loaded` says so."""
+    """Return a machine with the units of `--units`, and at rest under its loads where `--loaded` says so."""
     machine = replace(machine, loaded=True) if getattr(options, "loaded", False) else machine
     return machine.in_units(options.units) if options.units else machine
 
 
 def print_json(data: object) -> None:
     """Print plain data as JSON, with escapes where the output does not know all characters."""
-    plain = not (getattr(sys.stdout, "encoding", None) or "utf-8").lower().startswith("utf")
-    print(json.dumps(data, ensure_ascii=plain, allow_nan=False, indent=1))
+    encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
+    print(json.dumps(data, ensure_ascii=not encoding.lower().startswith("utf"), allow_nan=False, indent=1))
 
 
 def print_result(
@@ -265,7 +275,7 @@ def print_result(
     written: "Sequence[Path]" = (),
     message: str = "",
 ) -> int:
-    """Print a result and the files that were written, and list these in their folder.
+    """Print a result and the names of the files that were written, and keep their checksums in their folder.
 
     Args:
         options: the options of the command; with `--json` the result is printed as data.
@@ -327,16 +337,15 @@ def note_damage(folder: Path, repaired: str, unchecked: bool, changed: "Sequence
         )
 
 
+class ShownProgress(Protocol):
+    """Shows how much of the work is done, of how much, and perhaps a few words on its state."""
+
+    def __call__(self, done: int, total: int, words: str = "", /) -> None: ...
+
+
 @contextmanager
-def progress_bar(activity: str) -> "Iterator[Progress]":
+def progress_bar(activity: str) -> "Iterator[ShownProgress]":
     """Show a bar on stderr with the remaining time; show nothing where stderr is not a terminal."""
-    with search_bar(activity) as update:
-        yield lambda done, total: update(done, total, "")
-
-
-@contextmanager
-def search_bar(activity: str) -> "Iterator[Callable[[int, int, str], None]]":
-    """Show a bar that also has a few words on the state of the work: (done, total, words)."""
     if not sys.stderr.isatty():
         yield lambda *_: None
         return
@@ -348,13 +357,18 @@ def search_bar(activity: str) -> "Iterator[Callable[[int, int, str], None]]":
         *columns, console=Console(stderr=True), transient=True, speed_estimate_period=PROGRESS_SECONDS
     ) as bar:
         task = bar.add_task(activity, total=None)
-        yield lambda done, total, words: bar.update(
+        yield lambda done, total, words="": bar.update(
             task, completed=done, total=total, description=f"{activity} {words}".rstrip()
         )
 
 
 def judge_requirements(machine: "Machine", printing: bool = True) -> int:
-    """Judge the requirements of a machine's file, print the verdicts, and return the exit code."""
+    """Judge the requirements of a machine's file, print the verdicts, and return the exit code.
+
+    Args:
+        machine: the machine; without requirements there is nothing to judge or to print.
+        printing: whether the verdicts are printed, which they are not beside JSON.
+    """
     if not machine.requirements:
         return DONE
     from kinetostat.studies.requirements import requirements

@@ -15,7 +15,6 @@ from kinetostat.commands.common import (
     note_damage,
     print_result,
     progress_bar,
-    search_bar,
     takes_figures,
     takes_json,
     takes_machine,
@@ -38,7 +37,9 @@ if TYPE_CHECKING:
 
 STUDY_HELP = "a study file, the name of a bundled study (see `kinetostat list`), or the folder of a study to continue"
 EXPLAINING = "is done, the best design is being explained"
-"""Words behind the bar of a search once all designs have been computed."""
+"""Words after "searching" once all designs have been computed."""
+KEYS_OF_FRONT = ("name", "status", "message", "evaluations", "front")
+"""Keys of the result that `pareto --json` prints: those of the front, because no single design is the best."""
 
 
 def add_design_commands(commands: "Commands") -> None:
@@ -153,10 +154,10 @@ def _validate(options: argparse.Namespace) -> int:
     from kinetostat.views.tables import print_answer
     from kinetostat.views.validation import VALIDATION
 
-    poses = [[f"pose.{setting}" for setting in pose] for pose in options.poses or [[]]]
-    lines = [f"tolerances.{line}" for line in options.tolerances]
-    machines = [load_machine(options, [*pose, *lines]) for pose in poses]
     _refuse_other_options(options)
+    poses = [[f"pose.{setting}" for setting in pose] for pose in options.poses or [[]]]
+    tolerances = [f"tolerances.{line}" for line in options.tolerances]
+    machines = [load_machine(options, [*pose, *tolerances]) for pose in poses]
     for machine in machines:
         analysis = analyze(machine)
         if analysis.status is not Status.OK:
@@ -174,17 +175,18 @@ def _validate(options: argparse.Namespace) -> int:
 
 
 def _refuse_other_options(options: argparse.Namespace) -> None:
-    """Refuse options that belong to the other kind of validation."""
+    """Refuse options of a measured stiffness without one, and options beside a measured stiffness that it lacks."""
     options_of_measured = {
         "--fit": options.fit, "--tolerance": options.tolerances, "--sigma": options.sigma,
         "--sigma-angle": options.sigma_angle, "-o": options.output,
     }  # fmt: skip
-    wrong = [name for name, given in options_of_measured.items() if given]
-    if wrong and not options.measured:
-        raise InputError(f"{wrong[0]} is about a measured stiffness; give its file with --measured, or leave it out.")
-    if options.measured and options.engine:
+    if not options.measured:
+        if name := next((name for name, value in options_of_measured.items() if value), ""):
+            raise InputError(f"{name} is about a measured stiffness; give its file with --measured, or leave it out.")
+        return
+    if options.engine:
         raise InputError("--engine and --measured are two kinds of validation; give one of them at a time.")
-    if options.measured and len(options.poses) > 1:
+    if len(options.poses) > 1:
         raise InputError("a stiffness was measured at one pose; give --pose once, or columns of the pose in the file.")
 
 
@@ -200,39 +202,47 @@ def _validate_measured(options: argparse.Namespace, machine: "Machine") -> int:
 
 
 def _optimize(options: argparse.Namespace) -> int:
-    return _show(options, *_search(options))
+    return _search(options, _problem_of(options))
 
 
 def _pareto(options: argparse.Namespace) -> int:
-    result, changed = _search(options, least_objectives=2)
-    return _show(options, result, changed, ("name", "status", "message", "evaluations", "front"))
+    problem = _problem_of(options)
+    if len(problem.objectives) < 2:
+        raise InputError("a Pareto front needs two objectives or more; for one, use `kinetostat optimize`.")
+    return _search(options, problem, KEYS_OF_FRONT)
 
 
-def _search(options: argparse.Namespace, least_objectives: int = 1) -> "tuple[Result, list[str]]":
-    """Search for the best design, in the folder of a study that is continued or of `-o`, which it becomes, if any.
-
-    Returns:
-        The result, and the names of files in the folder that were not as they had been written.
-    """
+def _problem_of(options: argparse.Namespace) -> "Problem":
+    """Return the problem of the study; if STUDY is the folder of a search, `options.output` becomes this folder."""
     from kinetostat.spec.document import exists
     from kinetostat.studies.optimisation.problem import load_problem
     from kinetostat.studies.optimisation.search import stored_problem
-    from kinetostat.studies.storage import differing
     from kinetostat.studies.study_folder import holds_study
 
     folder = Path(options.study)
     if exists(folder) and holds_study(folder):
         if options.settings or options.output:
             raise InputError(f'"{folder}" holds a study together with its settings; leave out --set and -o.')
-        problem, options.output = stored_problem(folder), folder
-    else:
-        problem = load_problem(options.study, options.settings)
+        options.output = folder
+        return stored_problem(folder)
+    problem = load_problem(options.study, options.settings)
     if options.resume and options.output is None:
         raise InputError("--resume continues the search in a folder; name the folder with -o.")
-    if len(problem.objectives) < least_objectives:
-        raise InputError("a Pareto front needs two objectives or more; for one, use `kinetostat optimize`.")
-    changed = differing(options.output) if options.output else []
-    return search_with_bar(problem, options.output, options.resume), changed
+    return problem
+
+
+def _search(options: argparse.Namespace, problem: "Problem", keys: "Sequence[str]" = ()) -> int:
+    """Search for the best design, in a folder if there is one, and show the result; return the exit code.
+
+    Args:
+        options: the options of the command; `output` is the folder.
+        problem: the problem to solve.
+        keys: the only keys of its JSON that are printed; all if empty.
+    """
+    from kinetostat.studies.storage import differing
+
+    changed = differing(options.output) if options.output else []  # before the search writes there
+    return _show_result(options, search_with_bar(problem, options.output, options.resume), changed, keys)
 
 
 def search_with_bar(problem: "Problem", folder: Path | None, resume: bool = False) -> "Result":
@@ -245,16 +255,16 @@ def search_with_bar(problem: "Problem", folder: Path | None, resume: bool = Fals
     """
     from kinetostat.studies.optimisation.search import optimize
 
-    with search_bar("searching") as update:
+    with progress_bar("searching") as progress:
 
-        def progress(done: int, total: int, best: float | None) -> None:
+        def show_best(done: int, total: int, best: float | None) -> None:
             words = "" if best is None else f"(best {best:.8g})"
-            update(done, total, words if done < total else EXPLAINING)
+            progress(done, total, words if done < total else EXPLAINING)
 
-        return optimize(problem, folder, progress, resume)
+        return optimize(problem, folder, show_best, resume)
 
 
-def _show(options: argparse.Namespace, result: "Result", changed: "Sequence[str]", keys: "Sequence[str]" = ()) -> int:
+def _show_result(options: argparse.Namespace, result: "Result", changed: "Sequence[str]", keys: "Sequence[str]") -> int:
     """Write the files of a result, print it, and judge the requirements of its machine; return the exit code.
 
     Args:
@@ -271,8 +281,10 @@ def _show(options: argparse.Namespace, result: "Result", changed: "Sequence[str]
     written = []
     if options.output:
         log = result.log
-        repaired = "nothing but its history" if log.cleaned else ""
-        repaired = f"{log.repaired:,} of {len(log.steps):,} steps" if log.repaired else repaired
+        if log.repaired:
+            repaired = f"{log.repaired:,} of {len(log.steps):,} steps"
+        else:
+            repaired = "nothing but its history" if log.cleaned else ""
         note_damage(options.output, repaired, log.unchecked, changed)
         written = write_result(result, options.output) + write_figures(options, drawings_of(RESULT, result))
 
@@ -280,7 +292,7 @@ def _show(options: argparse.Namespace, result: "Result", changed: "Sequence[str]
         data = json_of(RESULT, result)
         return {key: data.get(key) for key in keys} if keys else data
 
-    code = print_result(
+    exit_code = print_result(
         options, result.solved, as_data, lambda console: print_answer(console, RESULT, result), written, result.message
     )
-    return judge_requirements(result.machine, printing=not options.json) if result.solved else code
+    return judge_requirements(result.machine, printing=not options.json) if result.solved else exit_code

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from kinetostat.commands.common import (
     DONE,
-    MACHINE,
+    MACHINE_HELP,
     NO_ANSWER,
     add_command,
     as_wanted,
@@ -22,7 +22,6 @@ from kinetostat.commands.common import (
     no_answer,
     print_result,
     progress_bar,
-    search_bar,
     takes_figures,
     takes_json,
     takes_loaded,
@@ -30,6 +29,7 @@ from kinetostat.commands.common import (
     takes_ranges,
     takes_settings,
     takes_units,
+    whole_number,
 )
 from kinetostat.commands.design import search_with_bar
 
@@ -42,15 +42,24 @@ EXPORT_FORMATS = (
 )  # fmt: skip
 """Formats of `export`, which help names without loading what writes them."""
 REPORT_PARTS = ("maps", "guidelines", "sensitivity", "validation")
-
+"""Parts that `report --without` omits, which help names without loading `studies.report`."""
 SHOWN_MACHINE = "zhang-gosselin-4dof"
 """The machine that is shown where none is named."""
-PORT = 8000
+USUAL_PORT = 8000
 """Port of the page where none is asked for: the usual one of web servers under development."""
+GREATEST_PORT = 65535
+"""Ports have 16 bits; 0 would stand for any port that is free, which no browser could know."""
 LOCAL_HOSTS = ("127.0.0.1", "localhost", "::1")
 """Addresses that only this computer can reach."""
 STUDIO_PACKAGE = "nicegui"
 """Package without which the studio is not installed."""
+NEEDS = """\
+what formats need:
+c, mex, linuxcnc, fmu, page, link: legs with closed forms (three parallel revolutes, or a ball joint at an end).
+klipper, reprapfirmware: coordinates x, y and z in the pose, and a load; klipper a rest at all points as well.
+modes, state-space, mjcf-vibration: something that has a mass.
+nastran, abaqus, ansys: a machine that is rigid in no direction.
+An export that a machine cannot fill says so in a sentence and writes nothing."""
 
 
 def add_document_commands(commands: "Commands") -> None:
@@ -66,15 +75,6 @@ def add_document_commands(commands: "Commands") -> None:
     reproduce.add_argument("--full", action="store_true", help="print every number, equation and statement")
     takes_json(reproduce)
     _add_studio_command(commands)
-
-
-NEEDS = """\
-what formats need:
-c, mex, linuxcnc, fmu, page, link: legs with closed forms (three parallel revolutes, or a ball joint at an end).
-klipper, reprapfirmware: coordinates x, y and z in the pose, and a load; klipper a rest at all points as well.
-modes, state-space, mjcf-vibration: something that has a mass.
-nastran, abaqus, ansys: a machine that is rigid in no direction.
-An export that a machine cannot fill says so in a sentence and writes nothing."""
 
 
 def _add_export_command(commands: "Commands") -> None:
@@ -156,15 +156,11 @@ def _add_studio_command(commands: "Commands") -> None:
         "kinetostat studio tripteron --port 8010",
     )  # fmt: skip
     studio.set_defaults(doing="opening the studio", serves=True)
-    studio.add_argument(
-        "machine", metavar="MACHINE", nargs="?", default=SHOWN_MACHINE, help=f"{MACHINE}; default: {SHOWN_MACHINE}"
-    )
-    takes_settings(studio, 'override a field, e.g. --set geometry.base_radius="26 cm"; repeatable')
-    takes_units(studio)
-    studio.add_argument("--port", type=_port, default=PORT, help=f"port to listen on (default: {PORT})")
+    takes_machine(studio, f"{MACHINE_HELP}; default: {SHOWN_MACHINE}", SHOWN_MACHINE)
+    studio.add_argument("--port", type=_port, default=USUAL_PORT, help=f"port to listen on (default: {USUAL_PORT})")
     studio.add_argument(
         "--host", default=LOCAL_HOSTS[0],
-        help="address to listen on (default: 127.0.0.1, which only this computer can reach)",
+        help=f"address to listen on (default: {LOCAL_HOSTS[0]}, which only this computer can reach)",
     )  # fmt: skip
     studio.add_argument(
         "--state", metavar="FOLDER", type=Path,
@@ -188,8 +184,16 @@ def _report(options: argparse.Namespace) -> int:
     result = result.in_units(options.units) if result and options.units else result
     machine = as_wanted(options, subject.machine if result is None else result.machine)
     with progress_bar("computing") as progress:
-        further = wanted.fit, wanted.motion, wanted.elevations
-        answers = gather(machine, wanted.ranges, wanted.without, result, progress, *further)
+        answers = gather(
+            machine,
+            wanted.ranges,
+            wanted.without,
+            result,
+            progress,
+            fit=wanted.fit,
+            motion=wanted.motion,
+            elevations=wanted.elevations,
+        )
         if answers.analysis.status is Status.OK:
             words = [options.subject, *(word for text in options.settings for word in ("--set", text))]
             write_report(answers, wanted, words, subject.inputs, path, progress)
@@ -201,21 +205,23 @@ def _report(options: argparse.Namespace) -> int:
 
 
 def _export(options: argparse.Namespace) -> int:
-    from kinetostat.exchange.formats import choose
+    from kinetostat.exchange.formats import format_for
     from kinetostat.kinematics.status import Status
     from kinetostat.studies.analysis import analyze
     from kinetostat.studies.storage import place_of
     from kinetostat.views.tables import print_written, terminal
 
-    chosen = choose(options.to, options.output)
+    export_format = format_for(options.to, options.output)
     if options.output:
-        place_of(options.output)
+        place_of(options.output)  # a place that cannot be written is refused before anything is computed
     analysis = analyze(load_machine(options))
     if analysis.status is not Status.OK:
         return no_answer(analysis.message)
-    stem = re.sub(r"[^\w.-]+", "-", Path(options.machine).stem if options.output is None else "").strip("-")
-    path = options.output or Path(f"{stem}{chosen.suffix}")
-    written = chosen.write(analysis, path, inputs=options.inputs, outputs=options.outputs, over=options.ranges or None)
+    stem = re.sub(r"[^\w.-]+", "-", Path(options.machine).stem).strip("-")
+    path = options.output or Path(f"{stem}{export_format.suffix}")
+    written = export_format.write(
+        analysis, path, inputs=options.inputs, outputs=options.outputs, over=options.ranges or None
+    )
     print_written(terminal(), written)
     return DONE
 
@@ -227,8 +233,8 @@ def _reproduce(options: argparse.Namespace) -> int:
 
     with progress_bar("reproducing") as progress:
         reproduction = reproduce(progress)
-    with search_bar("drawing") as drawing:
-        written = write_all(reproduction, options.output, options.formats, drawing)
+    with progress_bar("drawing") as progress:
+        written = write_all(reproduction, options.output, options.formats, progress)
     list_written(options.output, written)
     return print_result(
         options,
@@ -239,9 +245,7 @@ def _reproduce(options: argparse.Namespace) -> int:
 
 
 def _port(text: str) -> int:
-    if not text.isdecimal() or not 0 < int(text[:6]) < 65536:
-        raise argparse.ArgumentTypeError(f"{text} is not a port; give a number from 1 to 65535")
-    return int(text)
+    return whole_number(text, f"a port; give a number from 1 to {GREATEST_PORT}", 1, GREATEST_PORT)
 
 
 def _studio(options: argparse.Namespace) -> int:

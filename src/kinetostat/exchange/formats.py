@@ -1,7 +1,7 @@
 """The export formats: their names, their suffixes, and which function writes each; `export` chooses one and calls it.
 
-A format is added here as one row of `KNOWN`. Its writer is imported only when it is used, so that the list is cheap.
-What several writers need, the reference point and names in one line, is below.
+A format is added here as one row of `FORMATS`. Its writer is imported only when it is used, so that the list is cheap.
+Below it stand the helpers that several writers share: the reference point, and names in one line.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,7 +28,7 @@ class Format:
             paths of the files it made.
         summary: the words on its content, for lists.
         other_suffixes: suffixes that are also common for its files.
-        options: what can be chosen: "inputs" and "outputs" by their names, "over" by ranges.
+        options: names of arguments that its function takes besides: "inputs", "outputs", "over".
     """
 
     name: str
@@ -52,7 +52,7 @@ class Format:
         chosen = {kind: names for kind, names in options.items() if names is not None}
         for kind in chosen:
             if kind not in self.options:
-                others = ", ".join(form.name for form in KNOWN if kind in form.options)
+                others = ", ".join(form.name for form in FORMATS if kind in form.options)
                 raise InputError(f"The format {self.name} has no {kind} to choose; {others} have: use --to.")
         module, _, function = self.writer.rpartition(".")
         write: Callable[..., list[Path]] = getattr(import_module(f"kinetostat.{module}"), function)
@@ -60,8 +60,8 @@ class Format:
 
 
 CHANNELS = ("inputs", "outputs")
-"""Options of formats that are functions of chosen inputs."""
-KNOWN = (
+"""Options of formats that hold functions or a state space: names of their arguments and of their results."""
+FORMATS = (
     Format("mjcf", ".xml", "exchange.mjcf.write", "machine for MuJoCo: bodies, joints, springs, closed loops"),
     Format(
         "mjcf-vibration",
@@ -122,7 +122,7 @@ KNOWN = (
         ".step",
         "exchange.solids.write_step",
         "solids of the machine as exact bodies, an assembly for CAD programs",
-        (".stp",),
+        other_suffixes=(".stp",),
     ),
     Format("csv", ".csv", "exchange.results.write_csv", "results at the pose, a number a line with its unit"),
     Format("netcdf", ".nc", "exchange.results.write_netcdf", "results at the pose, labelled, with units"),
@@ -132,14 +132,14 @@ KNOWN = (
         ".csv",
         "exchange.results.write_modes",
         "natural frequencies, motions of the tool and modal masses, as modes -o writes them",
-        (".nc",),
+        other_suffixes=(".nc",),
     ),
     Format(
         "state-space",
         ".mat",
         "exchange.results.write_state_space",
         "A, B, C, D of the vibrating machine, from chosen forces to chosen motions",
-        (".nc",),
+        other_suffixes=(".nc",),
         options=CHANNELS,
     ),
     Format(
@@ -163,19 +163,19 @@ KNOWN = (
 """Every format, machines first; a suffix belongs to the first of those that have it."""
 
 
-def choose(name: str | None, path: Path | None) -> Format:
+def format_for(name: str | None, path: Path | None) -> Format:
     """Return the format with a name or, without a name, the one that the suffix of a file belongs to.
 
     Raises:
         InputError: the name or suffix belongs to none.
     """
     if name is not None:
-        formats = {form.name: form for form in KNOWN}
-        return formats[choice(name, formats, "--to")]
-    by_suffix = {suffix: form for form in reversed(KNOWN) for suffix in (form.suffix, *form.other_suffixes)}
+        by_name = {form.name: form for form in FORMATS}
+        return by_name[choice(name, by_name, "--to")]
+    by_suffix = {suffix: form for form in reversed(FORMATS) for suffix in (form.suffix, *form.other_suffixes)}
     if path is not None and path.suffix.lower() in by_suffix:
         return by_suffix[path.suffix.lower()]
-    names = ", ".join(f"{form.name} ({form.suffix})" for form in KNOWN if by_suffix[form.suffix] is form)
+    names = ", ".join(f"{form.name} ({form.suffix})" for form in FORMATS if by_suffix[form.suffix] is form)
     raise InputError(
         "The format of the export is missing; name it with --to, or give -o a file with one of these suffixes: "
         f"{names}."
@@ -209,21 +209,29 @@ def export(
         InputError: an unknown format, a pose without a result, a machine that the format cannot hold, or a file that
             cannot be written.
     """
-    form, analysis = choose(to, Path(path)), analyze(machine)
+    form, analysis = format_for(to, Path(path)), analyze(machine)
     if analysis.status is not Status.OK:
         raise InputError(analysis.message)
     return form.write(analysis, Path(path), inputs=inputs, outputs=outputs, over=over)
 
 
 def reference_point(analysis: Analysis) -> list[float]:
-    """Return the point of K and C in the base frame, m [3]: the tool point T, in the plane of a planar machine."""
-    platform_of(analysis)
+    """Return the point of K and C in the base frame, m [3]: the tool point T, in the plane of a planar machine.
+
+    Raises:
+        ValueError: the analysis has no result.
+    """
+    platform_of(analysis)  # refuses an analysis without a result, whose machine has no place
     point = analysis.machine.reference_point(analysis.state.configuration)
     return [float(c) for c in point.components()]
 
 
 def platform_of(analysis: Analysis) -> tuple[Array, Array]:
-    """Return the position and rotation of the platform, without which nothing can be exported."""
+    """Return the position of the platform, m [3], and its rotation [3 x 3], base frame.
+
+    Raises:
+        ValueError: the analysis has no result; its status should have been looked at.
+    """
     if analysis.platform is None:
         raise ValueError("an analysis without a result cannot be exported")
     return analysis.platform

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 
 from nicegui import app, background_tasks, ui
 
-from kinetostat.exchange.formats import KNOWN
+from kinetostat.exchange.formats import FORMATS
 from kinetostat.machine.loading import bundled
 from kinetostat.studio.elements import icon_button, refuse
 from kinetostat.studio.processes import Turns, make_modest
@@ -45,8 +45,8 @@ class FilesMenu:
             for name, suffix, summary in REPORTS:
                 self._item(name, suffix, summary, ["report"])
             for shared in (True, False):
-                for known in (known for known in KNOWN if (known.name in SHARED) is shared):
-                    self._item(known.name, known.suffix, known.summary, ["export", "--to", known.name])
+                for form in (form for form in FORMATS if (form.name in SHARED) is shared):
+                    self._item(form.name, form.suffix, form.summary, ["export", "--to", form.name])
                 if shared:
                     ui.separator()
 
