@@ -287,10 +287,10 @@ def test_favourites_are_kept_loaded_compared_and_deleted(tmp_path):
         await design(page)
         await page.send("favourite 1 delete", "click")
         await page.send("confirm-no", "click")
-        assert len(Favourites(tmp_path).every()) == 1
+        assert len(Favourites(tmp_path).entries()) == 1
         await page.send("favourite 1 delete", "click")
         await page.send("confirm-yes", "click")
-        assert not Favourites(tmp_path).every()
+        assert not Favourites(tmp_path).entries()
 
     on_page(steps, state=tmp_path)
 

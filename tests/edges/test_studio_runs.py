@@ -34,7 +34,7 @@ def runs(tmp_path):
     found = Runs(tmp_path)
     yield found
     found.close()
-    for run in found.every():
+    for run in found.entries():
         found.wait(run.number)
 
 
@@ -54,7 +54,7 @@ def kept(finished, tmp_path):
     """The same, to be changed: its searches, and the first of them."""
     shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
     there = Runs(tmp_path)
-    yield there, there.of(1)
+    yield there, there.entry(1)
     there.close()
 
 
@@ -83,13 +83,13 @@ def test_plots_and_tables_of_a_search_have_the_units_of_the_machine(tmp_path):
 
 
 def followed(runs, number):
-    run = runs.of(number)
+    run = runs.entry(number)
     return Follower(run).progress(run)
 
 
 def until_begun(runs, number):
     """Until a search has made a step, which takes as long as its process needs to start."""
-    run = runs.of(number)
+    run = runs.entry(number)
     follower = Follower(run)
     waited_for(lambda: follower.progress(run).steps, run.folder)
 
@@ -126,15 +126,15 @@ def test_a_damaged_search_does_not_hide_the_others(kept, tmp_path, damage):
     else:
         (folder / HISTORY).unlink()
         (folder / HISTORY).mkdir()
-    assert [run.number for run in there.every()] == [2, 1]
-    assert there.every()[1].stage is Stage.DONE
+    assert [run.number for run in there.entries()] == [2, 1]
+    assert there.entries()[1].stage is Stage.DONE
     if damage == "history":
         assert followed(there, 2).best == [], "lines that cannot be read are left out"
     else:
         with pytest.raises(UNREADABLE):
             followed(there, 2)
-    there.delete(2) if not there.of(2).stage.active else shutil.rmtree(folder)
-    assert [run.number for run in there.every()] == [1]
+    there.delete(2) if not there.entry(2).stage.active else shutil.rmtree(folder)
+    assert [run.number for run in there.entries()] == [1]
 
 
 def test_a_front_is_known_while_it_grows_and_ends_as_the_command_says(runs):
@@ -151,16 +151,16 @@ def test_stopped_after_a_step_it_goes_on_to_the_same_end(runs, tmp_path):
     run = runs.start(written(SMALL, *LONG))
     until_begun(runs, run.number)
     runs.stop(run.number)
-    assert runs.of(run.number).stage in (Stage.STOPPING, Stage.STOPPED)
+    assert runs.entry(run.number).stage in (Stage.STOPPING, Stage.STOPPED)
     runs.wait(run.number)
     found = followed(runs, run.number)
     assert found.run.stage is Stage.STOPPED
     assert found.result["objective"] == found.best[-1]
     again = Runs(tmp_path)
-    again.go_on(run.number)
-    assert again.of(run.number).stage is Stage.RUNNING
+    again.resume(run.number)
+    assert again.entry(run.number).stage is Stage.RUNNING
     with refused("only a search that was stopped can be resumed"):
-        again.go_on(run.number)
+        again.resume(run.number)
     follower = Follower(run)
     waited_for(lambda: follower.progress(run).steps > found.steps, run.folder)
     again.close()
@@ -181,13 +181,13 @@ def test_when_the_server_is_killed_the_search_stops_and_is_kept(tmp_path):
     assert server.stdout.readline().strip() == b"started"
     runs = Runs(tmp_path)
     until_begun(runs, 1)
-    assert runs.of(1).stage is Stage.RUNNING
+    assert runs.entry(1).stage is Stage.RUNNING
     with refused("started by another studio"):
         runs.stop(1)
     server.kill()
     server.communicate()
-    waited_for(lambda: not runs.of(1).stage.active, tmp_path)
-    (run,) = runs.every()
+    waited_for(lambda: not runs.entry(1).stage.active, tmp_path)
+    (run,) = runs.entries()
     assert (run.stage, run.name) == (Stage.STOPPED, "Zhang & Gosselin, section 4.3")
     assert followed(runs, 1).steps
 
@@ -211,10 +211,18 @@ def test_a_tab_has_one_search_at_a_time_and_leaves_the_other_place_to_others(run
 def test_a_search_that_is_deleted_is_gone(kept):
     runs, run = kept
     runs.delete(run.number)
-    assert not runs.every()
+    assert not runs.entries()
     assert not run.folder.exists()
     with refused("has been deleted"):
-        runs.of(run.number)
+        runs.entry(run.number)
+
+
+def test_a_search_in_the_folder_of_a_deleted_one_has_its_own_name(kept):
+    runs, former = kept
+    runs.delete(former.number)
+    run = runs.start(written(SMALL.replace(f'"{former.name}"', f'"{former.name.upper()}!"'), *QUICK))
+    runs.wait(run.number)
+    assert (run.folder, run.name) == (former.folder, f"{former.name.upper()}!")
 
 
 def test_a_search_that_fails_says_why(kept):
@@ -223,9 +231,9 @@ def test_a_search_that_fails_says_why(kept):
         question = run.folder / name
         question.write_text(question.read_text("utf-8").replace('"compliance_sum"', '"nonsense"'), "utf-8")
     (run.folder / "result.json").unlink()
-    runs.go_on(run.number)
+    runs.resume(run.number)
     runs.wait(run.number)
-    found = runs.of(run.number)
+    found = runs.entry(run.number)
     assert found.stage is Stage.FAILED
     assert "is damaged and cannot be read" in failure(found)
 
@@ -234,7 +242,7 @@ def test_a_search_of_another_process_is_seen_to_run(kept):
     runs, run = kept
     assert run.stage is Stage.DONE
     with study_folder(run.folder):
-        assert runs.of(run.number).stage is Stage.RUNNING
+        assert runs.entry(run.number).stage is Stage.RUNNING
 
 
 def test_a_draft_is_read_as_a_study_file_is():
@@ -304,15 +312,18 @@ def test_bad_studies_are_refused(content, words):
 
 def test_favourites_are_machine_files_with_a_note(tmp_path):
     kept = Favourites(tmp_path)
-    assert not kept.every()
+    assert not kept.entries()
     machine = load("tripteron")
     one = kept.keep(machine, 'stiff "one"', "first\nnote")
     kept.keep(machine, "another")
-    assert [(f.name, f.note) for f in Favourites(tmp_path).every()] == [("another", ""), ('stiff "one"', "first note")]
+    assert [(one.name, one.note) for one in Favourites(tmp_path).entries()] == [
+        ("another", ""),
+        ('stiff "one"', "first note"),
+    ]
     again = one.machine()
     assert again.name == 'stiff "one"'
     assert values(again) == values(machine)
     kept.delete(one.number)
-    assert [f.name for f in kept.every()] == ["another"]
+    assert [f.name for f in kept.entries()] == ["another"]
     with refused("1 to 80"):
         kept.keep(machine, " ")

@@ -8,6 +8,7 @@ import json
 import re
 import sys
 import textwrap
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +18,7 @@ from kinetostat.late import leave_out_property_lists, postpone_glyph_names
 from kinetostat.spec.installation import as_typed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from typing import TypeAlias
 
     from matplotlib.figure import Figure
@@ -223,7 +224,7 @@ def whole_number(text: str, refusal: str, least: int = 0, most: int = 10**MOST_D
 
     Args:
         text: the word of the option.
-        refusal: follows the word if it is no such number: "a port; give a number from 1 to 65535".
+        refusal: follows the word in the message where it is refused: "a port; give a number from 1 to 65535".
         least: the least number allowed.
         most: the greatest number allowed.
     """
@@ -344,7 +345,7 @@ class ShownProgress(Protocol):
 
 
 @contextmanager
-def progress_bar(activity: str) -> "Iterator[ShownProgress]":
+def progress_bar(activity: str) -> Iterator[ShownProgress]:
     """Show a bar on stderr with the remaining time; show nothing where stderr is not a terminal."""
     if not sys.stderr.isatty():
         yield lambda *_: None

@@ -150,7 +150,7 @@ class FavouritesPanel:
 
     def fill(self) -> None:
         """List the favourites that there are now."""
-        favourites = self._favourites.every()
+        favourites = self._favourites.entries()
         self._chosen &= {PRESENT_NUMBER, *(favourite.number for favourite in favourites)}
         self._list.clear()
         with self._list:
@@ -209,7 +209,7 @@ class FavouritesPanel:
 
     def _ask(self) -> None:
         try:
-            chosen = [kept for kept in reversed(self._favourites.every()) if kept.number in self._chosen]
+            chosen = [kept for kept in reversed(self._favourites.entries()) if kept.number in self._chosen]
             machines = [(kept.name, kept.machine()) for kept in chosen]
         except InputError as error:
             refuse(str(error))

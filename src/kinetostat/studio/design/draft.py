@@ -6,7 +6,7 @@ A draft becomes a `StudyFile` by the same reader as a file does, so that the for
 import math
 import re
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 from kinetostat.machine.loading import build, bundled, load
 from kinetostat.machine.machine import Machine
@@ -24,15 +24,22 @@ from kinetostat.studio.design.state_folder import slug
 from kinetostat.studio.wording import shown_value, typed_value
 from kinetostat.units import UNIT, UnitError
 
+StudyTable: TypeAlias = dict[str, Any]
+"""A table of a study file, such as one of its variables, by the words of the file."""
 BOUNDS_SHARE = 0.2
 """Bounds of a new variable, as a share of its present value: a change that a designer would consider."""
+LEAST_WIDTH = 1e-9
+"""Least end of a slider of which the share is taken where the value is zero, SI: equal bounds would be refused."""
 FORM = "the study"
 """Name of a draft in messages, where a file would have its path."""
 MOST_OBJECTIVES = 4
 """Objectives that the form offers, as many as a front can be looked at with; a file may have more."""
+SEARCH_KEYS = ("population", "generations", "seed")
+"""Numbers of the search that the form always shows, also where a study leaves them out."""
+SHOWN_PARTS = ("schema", "name", "machine", "set", "variables", "objectives", "constraints", "poses", "optimizer")
+"""Parts of a study file that the form shows, or that a draft writes itself; others are carried along as they are."""
 _NUMBER_AND_UNIT = re.compile(rf"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*{UNIT.pattern}\s*")
-SEARCH = OptimizerTable()
-"""The search that is offered first."""
+"""A bound that a study file may hold as it was typed: anything else that can be read is arithmetic."""
 
 
 @dataclass
@@ -48,16 +55,12 @@ class Draft:
 
     name: str
     machine: Machine | None = None
-    variables: list[dict[str, Any]] = field(default_factory=list)
-    objectives: list[dict[str, Any]] = field(default_factory=lambda: [{"quantity": "compliance_sum"}])
-    constraints: list[dict[str, Any]] = field(default_factory=list)
-    poses: dict[str, Any] = field(default_factory=dict)
-    optimizer: dict[str, Any] = field(
-        default_factory=lambda: {
-            "population": SEARCH.population, "generations": SEARCH.generations, "seed": SEARCH.seed,
-        }
-    )  # fmt: skip
-    rest: dict[str, Any] = field(default_factory=dict)
+    variables: list[StudyTable] = field(default_factory=list)
+    objectives: list[StudyTable] = field(default_factory=lambda: [{"quantity": "compliance_sum"}])
+    constraints: list[StudyTable] = field(default_factory=list)
+    poses: StudyTable = field(default_factory=dict)
+    optimizer: StudyTable = field(default_factory=lambda: _search_numbers(OptimizerTable()))
+    rest: StudyTable = field(default_factory=dict)
 
     def study(self, machine: str) -> StudyFile:
         """Return the study as a file would hold it, about a machine of this name.
@@ -90,7 +93,7 @@ class Draft:
         return problem_of(self.study(machine.name), machine)
 
     def as_file(self, present: Machine) -> tuple[str, bytes]:
-        """A file name and the study as TOML: about a bundled machine with changes, or about a machine file beside it.
+        """Return a file name and the study as TOML, about a bundled machine with changes or a machine file beside it.
 
         Raises:
             InputError: a value is not valid.
@@ -115,8 +118,6 @@ def _count_in_words(count: int, noun: str) -> str:
 def draft_of(study: StudyFile, machine: Machine | None) -> Draft:
     """Return a draft of a study that has been read; `machine` None stands for the machine of the session."""
     tables = study.model_dump(mode="json", by_alias=True, exclude_none=True, exclude_defaults=True)
-    shown_parts = ("schema", "name", "machine", "set", "variables", "objectives", "constraints", "poses", "optimizer")
-    search = {key: getattr(study.optimizer, key) for key in ("population", "generations", "seed")}
     return Draft(
         name=study.name,
         machine=machine,
@@ -124,9 +125,13 @@ def draft_of(study: StudyFile, machine: Machine | None) -> Draft:
         objectives=tables["objectives"],
         constraints=tables.get("constraints", []),
         poses=tables.get("poses", {}),
-        optimizer={**search, **tables.get("optimizer", {})},
-        rest={key: value for key, value in tables.items() if key not in shown_parts},
+        optimizer=_search_numbers(study.optimizer) | tables.get("optimizer", {}),
+        rest={key: value for key, value in tables.items() if key not in SHOWN_PARTS},
     )
+
+
+def _search_numbers(search: OptimizerTable) -> StudyTable:
+    return {key: getattr(search, key) for key in SEARCH_KEYS}
 
 
 def bundled_draft(name: str) -> Draft:
@@ -161,10 +166,14 @@ def sent_draft(data: bytes, name: str, present: Machine) -> Draft:
 
 
 def usual_bounds(control: Control, value: float) -> tuple[str, str]:
-    """Return bounds for a new variable as text: 20 % about its value, or of the slider's end if that is zero."""
+    """Return bounds for a new variable as text: 20 % about its value, or of its slider's end if the value is zero.
+
+    Those of a stiffness that is rigid or free lie about `USUAL_STIFFNESS`.
+    """
     quantity = control.parameter.quantity
-    middle = value if math.isfinite(value) and (value or not quantity.stiff) else USUAL_STIFFNESS
-    around = BOUNDS_SHARE * abs(middle) if middle else BOUNDS_SHARE * max(control.high, 1e-9)
+    is_rigid_or_free = not math.isfinite(value) or (quantity.stiff and not value)
+    middle = USUAL_STIFFNESS if is_rigid_or_free else value
+    around = BOUNDS_SHARE * abs(middle) if middle else BOUNDS_SHARE * max(control.high, LEAST_WIDTH)
     low, high = middle - around, min(middle + around, quantity.most)
     return shown_value(quantity, low), shown_value(quantity, high)
 
@@ -201,10 +210,15 @@ def _reference(machine: Machine) -> tuple[str, dict[str, str]]:
     return f"{slug(machine.name, 'machine')}.toml", {}
 
 
-def _changes(machine: Machine, old: dict[str, Any]) -> dict[str, str]:
+def _changes(machine: Machine, known_values: dict[str, float]) -> dict[str, str]:
+    """Return the values that differ from known ones, by path and as a file writes them."""
     quantities = {leaf: p.quantity for p in parameters(machine.family) for leaf in p.leaves}
-    return {path: str(quantities[path].in_file(value)) for path, value in values(machine).items() if value != old[path]}
+    return {
+        path: str(quantities[path].in_file(value))
+        for path, value in values(machine).items()
+        if value != known_values[path]
+    }
 
 
-def _without_none(table: dict[str, Any]) -> dict[str, Any]:
+def _without_none(table: StudyTable) -> StudyTable:
     return {key: value for key, value in table.items() if value not in (None, "")}

@@ -13,12 +13,13 @@ from kinetostat.display import Scale, number, with_unit
 from kinetostat.frozen import dataclass
 from kinetostat.kinetostatics.quantities import plain_name
 from kinetostat.machine.machine import Machine
+from kinetostat.studies.folder_check import RESULT_FILE
 from kinetostat.studies.optimisation.log import best_designs
 from kinetostat.studies.optimisation.problem import Objective, Problem
 from kinetostat.studies.optimisation.result import machine_of_design
 from kinetostat.studies.optimisation.search import kept_log, steps_of, stored_problem
 from kinetostat.studies.study_folder import Record, read_history
-from kinetostat.studio.design.runs import FAILURE, RESULT, Run, Stage
+from kinetostat.studio.design.runs import FAILURE_FILE, Run, Stage
 from kinetostat.views.optimisation import OBJECTIVE_DIGITS
 
 
@@ -126,7 +127,7 @@ class Follower:
 
 def _result(folder: Path) -> dict[str, Any] | None:
     try:
-        result = json.loads((folder / RESULT).read_text("utf-8"))
+        result = json.loads((folder / RESULT_FILE).read_text("utf-8"))
     except (OSError, ValueError):
         return None
     return result if isinstance(result, dict) else None
@@ -134,5 +135,5 @@ def _result(folder: Path) -> dict[str, Any] | None:
 
 def failure(run: Run) -> str:
     """Return the reason why a search failed; empty if it did not."""
-    path = run.folder / FAILURE
+    path = run.folder / FAILURE_FILE
     return path.read_text("utf-8") if run.stage is Stage.FAILED and path.exists() else ""

@@ -83,7 +83,7 @@ class RunPanel:
         with ui.element("div").classes("design-head"):
             self.choice = choice({}, "search", self._choose, "run-choice").classes("grow")
             self.stop = icon_button("stop", "Stop after this step; all results are kept", self._stop, "run-stop")
-            self.go_on = icon_button("play_arrow", "Resume where it was stopped", self._go_on, "run-play_arrow")
+            self.resume = icon_button("play_arrow", "Resume where it was stopped", self._resume, "run-play_arrow")
             self.delete = icon_button("delete", "Delete this search", self._delete, "run-delete")
         self.bar = ui.linear_progress(0.0, show_value=False, size="4px").props('aria-label="progress"').mark("run-bar")
         self.line = ui.label("").classes("run-line").props('role="status"').mark("run-line")
@@ -105,7 +105,7 @@ class RunPanel:
 
     def follow(self, run: Run) -> None:
         """Bring a search that has just been started to the front."""
-        self._list([run, *(other for other in self._runs.every() if other.number != run.number)], run.number)
+        self._list([run, *(other for other in self._runs.entries() if other.number != run.number)], run.number)
         self.refresh()
 
     def close(self) -> None:
@@ -116,7 +116,7 @@ class RunPanel:
     def _read_searches(self, request: ProgressRequest) -> Searches:
         """Read the list of searches and the progress of one of them, in a thread."""
         try:
-            runs = self._runs.every()
+            runs = self._runs.entries()
         except InputError as error:
             return Searches([], problem=str(error))
         number = request.number or (runs[0].number if runs else 0)
@@ -169,7 +169,7 @@ class RunPanel:
         stage = progress.run.stage if progress else None
         several = progress is not None and len(progress.problem.objectives) > 1
         self.stop.set_enabled(stage is Stage.RUNNING)
-        self.go_on.set_enabled(stage in (Stage.STOPPED, Stage.FAILED))
+        self.resume.set_enabled(stage in (Stage.STOPPED, Stage.FAILED))
         self.delete.set_enabled(stage is not None and not stage.active)
         self.best.set_enabled(progress is not None and bool(progress.objectives))
         self.best.set_text("Load the knee" if several else "Load the best design")
@@ -200,8 +200,8 @@ class RunPanel:
     def _stop(self) -> None:
         self._attempt(self._runs.stop)
 
-    def _go_on(self) -> None:
-        self._attempt(lambda number: self._runs.go_on(number, self.choice.client.id))
+    def _resume(self) -> None:
+        self._attempt(lambda number: self._runs.resume(number, self.choice.client.id))
 
     def _delete(self) -> None:
         confirm(f"Delete search {self.choice.value} and all its designs?", lambda: self._attempt(self._forget))

@@ -106,7 +106,7 @@ class Favourites:
         """Favourites below `state`; nothing is written before the first one."""
         self._folder = state / FAVOURITES
 
-    def every(self) -> list[Favourite]:
+    def entries(self) -> list[Favourite]:
         """Return all favourites, the latest first; files that cannot be read are left out."""
         favourites = []
         for number, path in numbered_entries(self._folder).items():
