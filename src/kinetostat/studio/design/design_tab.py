@@ -9,6 +9,7 @@ from pathlib import Path
 
 from nicegui import ui
 
+from kinetostat.frozen import dataclass
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.analysis import analyze
@@ -24,6 +25,12 @@ from kinetostat.studio.lanes import Lane
 from kinetostat.studio.session import Session
 
 RESULT, FRONT, FAVOURITES = "Result", "Front", "Favourites"
+"""Names of the tabs on the right."""
+LEAST_COMPARED = 2
+"""Designs that are compared at a time, at least; `MOST_DESIGNS` at most, as in the command."""
+PRESENT_NUMBER = 0
+"""The number of the present machine in the list; favourites begin at 1."""
+PRESENT_NAME = "present machine"
 
 
 class Workshop:
@@ -58,7 +65,7 @@ class DesignTab:
             self.form = StudyForm(session, self._start)
         with ui.element("section").classes("design of-designing right").props('aria-label="search and result"'):
             with ui.element("div").classes("card run-card"):
-                self.runs = RunPanel(workshop.runs, load)
+                self.run_panel = RunPanel(workshop.runs, load)
             with ui.element("div").classes("card answer-card"):
                 with ui.tabs().classes("panel-tabs").props("dense no-caps") as self.tabs:
                     for name in (RESULT, FRONT, FAVOURITES):
@@ -66,19 +73,19 @@ class DesignTab:
                 panels = ui.tab_panels(self.tabs, value=RESULT, animated=False)
                 with panels.classes("panel-body").props("keep-alive"):
                     with ui.tab_panel(FRONT):
-                        self.runs.front.table()
+                        self.run_panel.front.table()
                     with ui.tab_panel(RESULT):
-                        self.runs.place_result()
+                        self.run_panel.place_result()
                     with ui.tab_panel(FAVOURITES):
                         self.favourites = FavouritesPanel(session, workshop.favourites, load)
 
     def set_front(self, is_in_front: bool) -> None:
         """Note whether the tab is in front: only then the page follows its searches."""
-        self.runs.timer.active = is_in_front
+        self.run_panel.timer.active = is_in_front
         if is_in_front:
             self._workshop.runs.prepare()
             self.favourites.fill()
-            self.runs.refresh()
+            self.run_panel.refresh()
 
     def renew(self) -> None:
         """Adapt the form to another machine that has been loaded."""
@@ -86,24 +93,22 @@ class DesignTab:
 
     def close(self) -> None:
         """Stop following the searches, because the page is gone; they go on."""
-        self.runs.close()
+        self.run_panel.close()
         self.favourites.close()
 
     def _start(self, draft: Draft) -> None:
         run = self._workshop.runs.start(draft.problem(self._session.machine), self.tabs.client.id)
         self.tabs.set_value(RESULT)
-        self.runs.follow(run)
+        self.run_panel.follow(run)
 
 
-LEAST_COMPARED = 2
-"""Designs that are compared at a time, at least; `MOST_DESIGNS` at most, as in the command."""
-PRESENT_NUMBER = 0
-"""The number of the present machine in the list; favourites begin at 1."""
-PRESENT_NAME = "present machine"
+@dataclass(frozen=True)
+class ComparisonRequest:
+    """Machines to compare, each with its name, the quantities to compare, and ranges of poses."""
 
-Named = list[tuple[str, Machine]]
-Request = tuple[Named, list[str], list[str]]
-"""Machines by name, the quantities to compare, and ranges of poses."""
+    machines: list[tuple[str, Machine]]
+    quantities: list[str]
+    ranges: list[str]
 
 
 class FavouritesPanel:
@@ -121,21 +126,17 @@ class FavouritesPanel:
         self._lane = Lane(_comparison_of, self._show)
         self._chosen: set[int] = set()
         with ui.element("div").classes("keep-row"):
-            self.name = (
-                ui.input("name").props(f"dense outlined maxlength={LONGEST_FAVOURITE_NAME}").mark("favourite-name")
-            )
-            self.note = (
-                ui.input("note").props(f"dense outlined maxlength={LONGEST_FAVOURITE_NOTE}").mark("favourite-note")
-            )
+            self.name = ui.input("name").props(f"maxlength={LONGEST_FAVOURITE_NAME}").mark("favourite-name")
+            self.note = ui.input("note").props(f"maxlength={LONGEST_FAVOURITE_NOTE}").mark("favourite-note")
             for box in (self.name, self.note):
-                box.classes("field grow")
+                box.props("dense outlined").classes("field grow")
             button = ui.button("Keep", icon="star", on_click=self._keep).props(MAIN_BUTTON)
             button.tooltip("keep the present machine as a favourite").mark("favourite-keep")
         self._list = ui.element("div").classes("favourites")
         with ui.element("div").classes("keep-row"):
             self.quantities = ui.input("numbers", placeholder="frequency_1, mass").mark("favourite-quantities")
-            self.over = ui.input("over", placeholder="x=-2 cm:2 cm:5").mark("favourite-over")
-            for box in (self.quantities, self.over):
+            self.ranges = ui.input("over", placeholder="x=-2 cm:2 cm:5").mark("favourite-over")
+            for box in (self.quantities, self.ranges):
                 box.props(f"dense outlined stack-label maxlength={LONGEST_FAVOURITE_NOTE}").classes("field grow")
         with ui.element("div").classes("design-foot"):
             ui.label(f"Tick two to {MOST_DESIGNS} machines to compare them.").classes("note grow")
@@ -154,35 +155,35 @@ class FavouritesPanel:
         self._chosen &= {PRESENT_NUMBER, *(favourite.number for favourite in favourites)}
         self._list.clear()
         with self._list:
-            self._line(PRESENT_NUMBER, PRESENT_NAME, "")
+            self._row(PRESENT_NUMBER, PRESENT_NAME, "")
             for kept in favourites:
-                with self._line(kept.number, kept.name, kept.note):
+                with self._row(kept.number, kept.name, kept.note):
                     self._button("input", f"Load {kept.name}", partial(self._take, kept), f"{kept.number} load")
                     self._button("delete", f"Delete {kept.name}", partial(self._delete, kept), f"{kept.number} delete")
-        self._count()
+        self._enable_comparison()
 
     def close(self) -> None:
         self._lane.close()
 
-    def _line(self, number: int, name: str, note: str) -> ui.element:
-        with ui.element("div").classes("favourite") as line:
+    def _row(self, number: int, name: str, note: str) -> ui.element:
+        with ui.element("div").classes("favourite") as row:
             box = ui.checkbox(value=number in self._chosen, on_change=lambda event: self._tick(number, event.value))
             box.props(f'dense aria-label="compare {in_quotes(name)}"').mark(f"favourite {number} tick")
             with ui.element("div").classes("grow"):
                 ui.label(name).classes("favourite-name")
                 if note:
                     ui.label(note).classes("favourite-note")
-        return line
+        return row
 
     @staticmethod
     def _button(icon: str, text: str, action: Callable[[], None], mark: str) -> None:
         icon_button(icon, text, action, f"favourite {mark}").props('size="sm"')
 
-    def _tick(self, number: int, on: bool) -> None:
-        self._chosen = self._chosen | {number} if on else self._chosen - {number}
-        self._count()
+    def _tick(self, number: int, is_ticked: bool) -> None:
+        self._chosen = self._chosen | {number} if is_ticked else self._chosen - {number}
+        self._enable_comparison()
 
-    def _count(self) -> None:
+    def _enable_comparison(self) -> None:
         self.compare.set_enabled(LEAST_COMPARED <= len(self._chosen) <= MOST_DESIGNS)
 
     def _keep(self) -> None:
@@ -217,13 +218,15 @@ class FavouritesPanel:
         if PRESENT_NUMBER in self._chosen:
             machines.insert(0, (PRESENT_NAME, self._session.machine))
         if len(machines) >= LEAST_COMPARED:
-            self._lane.ask((machines, _entries_of(self.quantities.value), _entries_of(self.over.value)))
+            self._lane.ask(
+                ComparisonRequest(machines, _entries_of(self.quantities.value), _entries_of(self.ranges.value))
+            )
 
-    def _show(self, _request: Request, shown: str | InputError) -> None:
-        if isinstance(shown, InputError):
-            refuse(str(shown))
+    def _show(self, _request: ComparisonRequest, answer: str | InputError) -> None:
+        if isinstance(answer, InputError):
+            refuse(str(answer))
             return
-        self.comparison.set_content(shown)
+        self.comparison.set_content(answer)
         self.window.open()
 
 
@@ -232,10 +235,10 @@ def _entries_of(text: str) -> list[str]:
     return [part.strip() for part in text.split(",") if part.strip()]
 
 
-def _comparison_of(request: Request) -> str | InputError:
-    machines, quantities, ranges = request
-    designs = [Design(label, machine, analyze(machine)) for label, machine in machines]
+def _comparison_of(request: ComparisonRequest) -> str | InputError:
+    """Compare machines in a thread; a refusal is returned, because the page shows it."""
+    designs = [Design(label, machine, analyze(machine)) for label, machine in request.machines]
     try:
-        return comparison_text(compare(designs, ranges, quantities=quantities))
+        return comparison_text(compare(designs, request.ranges, quantities=request.quantities))
     except InputError as refusal:
         return refusal

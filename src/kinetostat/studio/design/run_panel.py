@@ -37,8 +37,6 @@ LOOK_PERIOD = 0.5
 """Seconds between two looks at a search: it seems to move, and reading takes milliseconds."""
 NO_COLOUR = -1
 """The choice of no objective for the colour of a front."""
-AXES = {"across": "horizontal axis", "up": "vertical axis", "colour": "colour"}
-"""The choices of the plot of a front, and their labels."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +76,8 @@ class RunPanel:
         self._lane = Lane(self._read_searches, self._deliver)
         self._follower: Follower | None = None
         self._progress: SearchState | None = None
-        self._shown: object = None  # search, stage and number of steps that the page shows
-        self._place: int | None = None  # of the design that was loaded last, in the front
+        self._shown_state: object = None  # what the page shows of a search; nothing is drawn again while it is equal
+        self._loaded_place: int | None = None  # place in the front of the design that was loaded last
         with ui.element("div").classes("design-head"):
             self.choice = choice({}, "search", self._choose, "run-choice").classes("grow")
             self.stop = icon_button("stop", "Stop after this step; all results are kept", self._stop, "run-stop")
@@ -115,10 +113,7 @@ class RunPanel:
 
     def _read_searches(self, request: ProgressRequest) -> Searches:
         """Read the list of searches and the progress of one of them, in a thread."""
-        try:
-            runs = self._runs.entries()
-        except InputError as error:
-            return Searches([], problem=str(error))
+        runs = self._runs.entries()
         number = request.number or (runs[0].number if runs else 0)
         run = next((listed for listed in runs if listed.number == number), None)
         if run is None:
@@ -135,18 +130,17 @@ class RunPanel:
             return Searches(runs, problem=DAMAGED.format(run.number, run.folder, error))
 
     def _deliver(self, request: ProgressRequest, searches: Searches) -> None:
-        """Show what was read, unless another search has been chosen meanwhile; nothing is drawn where nothing is
-        new."""
+        """Show what was read if it is new, unless another search has been chosen meanwhile."""
         if request.number != int(self.choice.value or 0):
             self.refresh()
             return
         progress = searches.progress
         self._list(searches.runs, progress.run.number if progress else request.number)
         self._follower, self._progress = searches.follower, progress
-        key = progress and (progress.run, progress.steps, progress.result is None, searches.problem)
-        if key == self._shown and key is not None:
+        state = progress and (progress.run, progress.steps, progress.result is None, searches.problem)
+        if state is not None and state == self._shown_state:
             return
-        self._shown = key
+        self._shown_state = state
         self._offer(progress)
         if progress is None:
             self.line.set_text(searches.problem)
@@ -159,6 +153,7 @@ class RunPanel:
         self.text.set_content(paragraph(searches.problem, "lead") if searches.problem else result_text(progress))
 
     def _list(self, runs: list[Run], number: int) -> None:
+        """List the searches to choose from, this one or else the latest in front."""
         options = {run.number: f"{run.number} · {run.name} · {run.stage}" for run in runs}
         chosen = number if number in options else next(iter(options), None)
         if options != self.choice.options or chosen != self.choice.value:
@@ -178,12 +173,12 @@ class RunPanel:
 
     def _draw(self, progress: SearchState) -> None:
         if len(progress.problem.objectives) > 1:
-            self.front.show(progress, self._place)
+            self.front.show(progress, self._loaded_place)
         elif progress.steps:
             self.curve.run_method("show", convergence(progress))
 
     def _choose(self) -> None:
-        self._place = None
+        self._loaded_place = None
         self.refresh()
 
     def _load_best(self) -> None:
@@ -192,7 +187,7 @@ class RunPanel:
 
     def _load_design(self, place: int) -> None:
         if self._progress is not None and 0 <= place < len(self._progress.objectives):
-            self._place = place
+            self._loaded_place = place
             self._load(self._progress.design(place))
             if len(self._progress.problem.objectives) > 1:
                 self._draw(self._progress)
@@ -263,18 +258,18 @@ class FrontPanel:
         self._pick = pick
         self._progress: SearchState | None = None
         self._chosen: int | None = None
-        self._is_ready = False  # whether the choices are complete, so that a change of one is a wish
+        self._is_ready = False  # whether the choices are complete, so that a change of one is that of a designer
         with ui.element("div").classes("front-plot") as self.plot:
             with ui.row().classes("panel-tools") as self.tools:
-                self.across, self.up, self.coloured = (
-                    choice({}, label, self._change_axis, f"front-{mark}") for mark, label in AXES.items()
-                )
+                self.across = choice({}, "horizontal axis", self._change_axis, "front-across")
+                self.up = choice({}, "vertical axis", self._change_axis, "front-up")
+                self.coloured = choice({}, "colour", self._change_axis, "front-colour")
             self.view = FrontView("designs of the Pareto front; a click, or arrow keys and Enter, load one")
             self.view.mark("run-front").on("pick", self._pick_row)
 
     def table(self) -> None:
         """Put the table of all designs on the page."""
-        self.without = ui.label(NO_FRONT).classes("note")
+        self.no_front = ui.label(NO_FRONT).classes("note")
         self.rows = DesignTable("designs of the Pareto front").mark("front-table")
         self.rows.on("pick", self._pick_row)
 
@@ -282,7 +277,7 @@ class FrontPanel:
         """Show plot and table where the study has several objectives, else hide them."""
         self.plot.set_visibility(several)
         self.rows.set_visibility(several)
-        self.without.set_visibility(not several)
+        self.no_front.set_visibility(not several)
 
     def show(self, progress: SearchState, chosen: int | None) -> None:
         """Show the front of a search with several objectives; `chosen` is the place of the design that was loaded."""
@@ -291,7 +286,7 @@ class FrontPanel:
         if self.across.options != names:
             self._offer(names)
         self._draw()
-        self.rows.show_rows(*_table(progress), progress.knee, chosen)
+        self.rows.show_rows(*_columns(progress), progress.knee, chosen)
 
     def _offer(self, names: dict[int, str]) -> None:
         """Offer the objectives as axes and colour; with only two, the choice is hidden."""
@@ -310,7 +305,7 @@ class FrontPanel:
         progress = self._progress
         if progress is None:
             return
-        initial = progress.result and list(progress.result["initial"]["objectives"].values())
+        initial = list(progress.result["initial"]["objectives"].values()) if progress.result else []
         scales = [progress.scale(objective) for objective in progress.problem.objectives]
         self.view.run_method(
             "show",
@@ -333,15 +328,15 @@ def _in_units(values: Sequence[float], scales: Sequence[Scale]) -> list[float]:
     return [value * scale.factor for value, scale in zip(values, scales, strict=True)]
 
 
-def _table(progress: SearchState) -> tuple[list[str], list[list[float]], list[list[str]]]:
-    """Return names of columns, numbers to sort by, and texts: the objectives first, then the variables."""
+def _columns(progress: SearchState) -> tuple[list[str], list[list[float]], list[list[str]]]:
+    """Return the names of the columns, and of each design numbers to sort by and texts: objectives, then variables."""
     space, display, aims = progress.problem.space, progress.problem.machine.display, progress.problem.objectives
     designs = [] if progress.genes is None else space.values(progress.genes).tolist()
     values, texts = [], []
     for objectives, design in zip(progress.objectives, designs, strict=True):
         values.append([*objectives, *design])
-        goals = [display.number(value, aim.term.unit) for value, aim in zip(objectives, aims, strict=True)]
-        sizes = [v.in_words(size, display) for v, size in zip(space.searched_variables, design, strict=True)]
-        texts.append([*goals, *sizes])
+        goal_texts = [display.number(value, aim.term.unit) for value, aim in zip(objectives, aims, strict=True)]
+        pairs = zip(space.searched_variables, design, strict=True)
+        texts.append([*goal_texts, *(variable.in_words(size, display) for variable, size in pairs)])
     names = [plain_name(variable.name.removeprefix("geometry.")) for variable in space.searched_variables]
     return [*(f"{aim.goal} {progress.label(aim)}" for aim in aims), *names], values, texts

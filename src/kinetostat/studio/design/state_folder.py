@@ -1,6 +1,6 @@
-"""The folder of what outlives the page: where it is, its numbered entries, and the favourite machines kept in it.
+"""The state folder, which outlives the page: where it is, its numbered entries, and the favourite machines in it.
 
-Searches are kept in the same folder, by `runs`.
+The searches in it are those of `runs`.
 """
 
 import os
@@ -20,6 +20,8 @@ MOST_FAVOURITES = 100
 """Machines that are kept: more than anybody reads in a list."""
 LONGEST_FAVOURITE_NAME, LONGEST_FAVOURITE_NOTE = 80, 400
 """Characters of a name and of a note: a line, and some sentences of a list."""
+LONGEST_SLUG = 40
+"""Characters of a study's or a machine's name in that of its file: with its number, a listing still shows it whole."""
 RUNS, FAVOURITES = "runs", "favourites"
 """Folders of searches and of machines that are kept, in the state folder."""
 REMARK = "# Note:"
@@ -27,7 +29,7 @@ REMARK = "# Note:"
 
 
 def usual_state() -> Path:
-    """Return the folder for it among the user's data, by the custom of the operating system."""
+    """Return the state folder among the user's data, by the custom of the operating system."""
     home = Path.home()
     if sys.platform == "win32":
         base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
@@ -57,8 +59,8 @@ def check_state(folder: Path) -> None:
 
 def slug(name: str, otherwise: str) -> str:
     """Return a name as part of a file name: letters, digits and single hyphens; `otherwise` if none are left."""
-    kept = "".join(c if c.isalnum() and c.isascii() else "-" for c in name.lower())
-    return "-".join(part for part in kept.split("-") if part)[:40] or otherwise
+    hyphenated = "".join(c if c.isalnum() and c.isascii() else "-" for c in name.lower())
+    return "-".join(part for part in hyphenated.split("-") if part)[:LONGEST_SLUG] or otherwise
 
 
 def numbered_entries(folder: Path) -> dict[int, Path]:
@@ -79,7 +81,7 @@ class Favourite:
     """A machine that is kept.
 
     Attributes:
-        number: under which it is kept.
+        number: its number, with which the name of its file begins.
         path: the path of its machine file, which every command reads.
         name: the name of the machine.
         note: the designer's words about it.
@@ -112,10 +114,10 @@ class Favourites:
         for number, path in numbered_entries(self._folder).items():
             try:
                 name = str(read(path).get("name", path.stem))
-                first = path.read_text("utf-8").partition("\n")[0]
+                first_line = path.read_text("utf-8").partition("\n")[0]
             except (OSError, InputError):
                 continue
-            note = first.removeprefix(REMARK).removeprefix("# ").strip() if first.startswith("#") else ""
+            note = first_line.removeprefix(REMARK).removeprefix("# ").strip() if first_line.startswith("#") else ""
             favourites.append(Favourite(number, path, name, note))
         return favourites
 

@@ -61,6 +61,7 @@ def _so_far(progress: SearchState) -> str:
 
 
 def _objectives(progress: SearchState, result: dict[str, Any], best: str) -> str:
+    """Return the objectives and constraints of the initial design and of the one that is called `best`."""
     problem, rows = progress.problem, []
     for aim in problem.objectives:
         before, after = (design["objectives"][aim.term.label] for design in (result["initial"], result))
@@ -91,10 +92,13 @@ def _design(problem: Problem, result: dict[str, Any]) -> str:
 
 
 def _directions(result: dict[str, Any]) -> str:
-    rows = [(row["name"].removeprefix("compliance_"), row["gain"]) for row in result["directions"]]
+    rows = [(_direction_name(row), row["gain"]) for row in result["directions"] if row["gain"] is not None]
     over = "" if result["poses"]["count"] == 1 else " (worst of all poses)"
-    title = f"Stiffness, times that of the initial design{over}"
-    return heading(title) + gains("stiffness gain", [row for row in rows if row[1] is not None])
+    return heading(f"Stiffness, times that of the initial design{over}") + gains("stiffness gain", rows)
+
+
+def _direction_name(row: dict[str, Any]) -> str:
+    return str(row["name"]).removeprefix("compliance_")
 
 
 def _robustness(progress: SearchState, result: dict[str, Any]) -> str:
@@ -112,15 +116,16 @@ def _robustness(progress: SearchState, result: dict[str, Any]) -> str:
 def _remarks(result: dict[str, Any]) -> list[str]:
     bounded = [f"{name} ({bound})" for name, bound in result["at_bounds"].items()]
     remarks = [f"At a bound: {', '.join(bounded)}. Wider bounds would allow a better design."] if bounded else []
-    for direction in result["directions"]:
-        gain, name = direction["gain"], direction["name"].removeprefix("compliance_")
+    for row in result["directions"]:
+        gain, name = row["gain"], _direction_name(row)
         if gain is not None and gain < LEAST_STIFFNESS_LEFT:
             remarks.append(f"In the direction {name}, the best design keeps only {gain:.2g} of the initial stiffness.")
     return remarks + (result["ridges_text"] if result["front"] is None else [])
 
 
 def _exact(scale: Scale, *values: float | None) -> list[str]:
-    return [number(value and value * scale.factor, digits=OBJECTIVE_DIGITS) for value in values]
+    scaled = (None if value is None else value * scale.factor for value in values)
+    return [number(value, digits=OBJECTIVE_DIGITS) for value in scaled]
 
 
 def _ratio(before: float | None, after: float | None) -> str:
@@ -166,9 +171,9 @@ def _gains(comparison: Comparison, letters: str) -> str:
     compliances = [row for row in comparison.rows if row.group == "compliance"]
     columns = []
     for place, letter in enumerate(letters[1:], 1):
-        candidates = [(row.name.removeprefix("C_"), _gain(row, place)) for row in compliances]
-        shown = gains(f"{letter} against A", [(name, gain) for name, gain in candidates if gain is not None])
-        columns.append(f"<div><h4>{letter}</h4>{shown}</div>")
+        rows = [(row.name.removeprefix("C_"), _gain(row, place)) for row in compliances]
+        bars = gains(f"{letter} against A", [(name, gain) for name, gain in rows if gain is not None])
+        columns.append(f"<div><h4>{letter}</h4>{bars}</div>")
     return f'<div class="gains">{"".join(columns)}</div>'
 
 
@@ -191,9 +196,9 @@ def _numbers_table(title: str, comparison: Comparison, rows: Sequence[DesignRow]
 def _row(row: DesignRow, display: Display) -> str:
     cells = []
     for i, (value, percent) in enumerate(zip(row.values, row.percents, strict=True)):
-        shown = escape(engineering(value, row.unit, display))
-        strong = f"<b>{shown}</b>" if i in row.best else shown
-        cells.append(f"<td>{strong}{_change(row, percent) if i else ''}</td>")
+        text = escape(engineering(value, row.unit, display))
+        text = f"<b>{text}</b>" if i in row.best else text
+        cells.append(f"<td>{text}{_change(row, percent) if i else ''}</td>")  # no change of the first against itself
     return f'<tr><th scope="row">{escape(row.name.replace("_", " "))}</th>{"".join(cells)}</tr>'
 
 
