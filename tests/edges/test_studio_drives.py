@@ -10,7 +10,7 @@ from studio_page import on_page
 from kinetostat.machine.loading import as_toml, load
 from kinetostat.studies.drives import drives
 from kinetostat.studies.motions import read_motion
-from kinetostat.studio.playback import FRAMES, NO_MOTION, curves_of
+from kinetostat.studio.playback import FRAMES, NO_MOTION, CurveKind, plot_of
 
 MASSES = ("tool.mass=12 kg", "drives.lead=10 mm", "load.gravity=[0, 0, -9.81]")
 SINE = "field, amplitude, frequency [Hz]\nx, 5 mm, 4\nz, 2 mm, 8\n"
@@ -71,12 +71,12 @@ def test_every_kind_of_curve_has_its_unit(tmp_path):
     answer = drives(machine, read_motion(machine, tmp_path, text=SINE))  # as the command does
     times = answer.motion.times[::10]
     units = {}
-    for kind in ("Force", "Speed", "Motor", "Power", "Tool"):
-        label, units[kind], lines = curves_of(answer, kind, times)
+    for kind in CurveKind:
+        label, units[kind], lines = plot_of(answer, kind, times)
         assert units[kind] in label
         assert all(len(row) == len(times) for _, row in lines)
     assert units == {"Force": "N", "Speed": "mm/s", "Motor": "N·m", "Power": "W", "Tool": "µm"}
-    torque = curves_of(answer, "Motor", times)[2][2][1]
+    torque = plot_of(answer, CurveKind.MOTOR, times).lines[2][1]
     assert torque == pytest.approx(answer.curves.motor_torque[2][::10])
 
 

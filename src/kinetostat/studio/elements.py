@@ -11,9 +11,10 @@ import nicegui.elements.echart
 import nicegui.elements.scene  # noqa: F401  (both register what NiceGUI brings with it: ECharts and three.js)
 from nicegui import ui
 from nicegui.element import Element
-from nicegui.events import GenericEventArguments
+from nicegui.events import GenericEventArguments, UploadEventArguments
 
-from kinetostat.spec.document import LARGEST_FILE
+from kinetostat.spec.document import LARGEST_FILE, text_of
+from kinetostat.spec.errors import InputError
 from kinetostat.views.scene import RENDERER
 from kinetostat.views.scene.solids import looks_data
 
@@ -104,7 +105,7 @@ class DesignTable(Labelled, component=COMPONENTS / "design_table.js"):
     """Designs or other things as rows that sort by any column. Events: `pick` (the number of a row)."""
 
     def __init__(self, label: str, action: str = "load design") -> None:
-        """An empty table; `action` is what a screen reader says of the button of a row, before its number."""
+        """Build an empty table; `action` is what a screen reader says of the button of a row, before its number."""
         super().__init__(label)
         self._props["action"] = action
         self.show_rows([], [], [], None, None)
@@ -124,12 +125,12 @@ class QuantityRow(Labelled, component=COMPONENTS / "quantity_row.js"):
     """
 
     def __init__(self, label: str, meaning: str, steps: int, slides: bool) -> None:
-        """A row without a value yet; `steps` positions of its slider, if it has one."""
+        """Build a row without a value yet; `steps` is the last position of its slider, if it has one."""
         super().__init__(label)
         self._props.update(meaning=meaning, steps=steps, slides=slides, text="", position=0, problem="", taken=0)
 
-    def take(self) -> None:
-        """Show the present value in the place of what was typed, which may have meant the same."""
+    def replace_typed_text(self) -> None:
+        """Show the present value in the place of what was typed, also where both mean the same and no value changes."""
         self._set(taken=self._props["taken"] + 1)
 
     def show_value(self, text: str, position: int) -> None:
@@ -195,7 +196,9 @@ def in_quotes(text: str) -> str:
 def upload_field(
     on_upload: Callable[[Any], Any], on_refusal: Callable[[str], None], mark: str, suffix: str = ".toml"
 ) -> ui.upload:
-    """A hidden field that takes one file from the browser, by default TOML; `pickFiles` of it opens the dialogue.
+    """Return a hidden field that takes one file from the browser, by default TOML.
+
+    Its method `pickFiles` opens the dialogue in which the file is chosen.
 
     FastAPI keeps the function of every field that it has served, and with it the page, unless the page takes
     `on_upload` and `on_refusal` out of `called` when it goes.
@@ -208,6 +211,27 @@ def upload_field(
         auto_upload=True, max_file_size=LARGEST_FILE, max_files=1,
     )  # fmt: skip
     return field.props(f'accept="{suffix}" aria-hidden="true"').classes("unseen").mark(mark)
+
+
+def csv_button(text: str, take: Callable[[str], None], mark: str) -> None:
+    """Make a button that opens a CSV file; what `take` refuses of its text is shown.
+
+    Args:
+        text: the tooltip of the button.
+        take: takes the text; it may raise InputError.
+        mark: beginning of the names by which tests know button and field: "path" makes "path-open" and "path-upload".
+    """
+
+    async def read(event: UploadEventArguments) -> None:
+        data = await event.file.read()
+        upload.reset()
+        try:
+            take(text_of(data, event.file.name, "CSV"))
+        except InputError as error:
+            refuse(str(error))
+
+    upload = upload_field(read, refuse, f"{mark}-upload", ".csv")
+    icon_button("folder_open", text, lambda: upload.run_method("pickFiles"), f"{mark}-open")
 
 
 def refuse(message: str) -> None:

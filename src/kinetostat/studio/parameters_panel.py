@@ -122,7 +122,7 @@ class ParametersPanel:
     def _write(self, path: str, event: GenericEventArguments) -> None:
         def write() -> None:
             self._session.write(path, str(event.args))
-            self._rows[path].take()
+            self._rows[path].replace_typed_text()
 
         self._apply(path, write)
 

@@ -6,22 +6,22 @@ pose of the session, so that all linked views follow.
 """
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from enum import StrEnum
 from pathlib import Path
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from nicegui import events, ui
+from nicegui import ui
 
 from kinetostat.arrays import Array
 from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE, values
-from kinetostat.spec.document import text_of
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.drives import DriveLoads
 from kinetostat.studies.poses import read_poses
 from kinetostat.studio.answers import MotionRequest, Report, drives_along, finite
-from kinetostat.studio.elements import CurveView, icon_button, refuse, toggle, upload_field
+from kinetostat.studio.elements import CurveView, csv_button, icon_button, refuse, toggle
 from kinetostat.studio.lanes import Lane
 from kinetostat.studio.panels import Panel
 from kinetostat.studio.session import Session
@@ -34,6 +34,16 @@ STEPS_BETWEEN_KEPT_POSES = 24
 PATH_PERIOD = 0.08
 """Seconds between two poses of a path, if the computer keeps up: each is a whole analysis."""
 NO_PATH = "No path yet: open a CSV file of poses (as `kinetostat path` reads it), or keep two poses or more."
+FRAMES = 100
+"""Steps of a motion that is played: a movement to the eye, and each is a whole analysis."""
+FRAME_PERIOD = 0.12
+"""Seconds between two steps of a motion, if the computer keeps up: the longest at which they still look like one."""
+POINTS_SHOWN = 300
+"""Points of a curve: about as many as it has pixels across."""
+NO_MOTION = (
+    "No motion yet: open a CSV file of one (poses with times, poses with a feed rate, or sines), or name it in a "
+    'requirement of the file, { fits = "MOTOR", motion = "motion.csv" }.'
+)
 
 Poses: TypeAlias = dict[str, Array]
 """Values of each field along a path, SI."""
@@ -125,10 +135,7 @@ class Playback:
             with ui.row().classes("panel-tools"):
                 self._player = Player(PATH_PERIOD, 1, self._go, is_busy, "Play or pause", "path")
                 icon_button("add_location_alt", "Keep this pose", self._keep, "path-keep")
-                self.upload = upload_field(self._open, refuse, "path-upload", ".csv")
-                icon_button(
-                    "folder_open", "Open a CSV file of poses", lambda: self.upload.run_method("pickFiles"), "path-open"
-                )
+                csv_button("Open a CSV file of poses", self._open, "path")
                 icon_button("delete_outline", "Forget the path", self.clear, "path-clear")
                 ui.space()
                 icon_button("close", "Close", self.menu.close, "path-close")
@@ -145,18 +152,11 @@ class Playback:
         self._kept, self._path = [], {}
         self._show()
 
-    async def _open(self, event: events.UploadEventArguments) -> None:
-        data, name = await event.file.read(), event.file.name
-        self.upload.reset()
-        try:
-            text = text_of(data, name, "CSV")
-            with tempfile.TemporaryDirectory() as folder:
-                file = Path(folder) / "poses.csv"
-                file.write_text(text, "utf-8")
-                self._path = dict(read_poses(self._session.machine, file).leaves)
-        except InputError as error:
-            refuse(str(error))
-            return
+    def _open(self, text: str) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "poses.csv"
+            file.write_text(text, "utf-8")
+            self._path = dict(read_poses(self._session.machine, file).leaves)
         self._kept = []
         self._show()
 
@@ -175,14 +175,9 @@ class Playback:
     def _go(self) -> None:
         if self.count < 2:  # `begin_again` puts the slider back to 0, which also arrives here
             return
-        at = min(int(self._player.slider.value), self.count - 1)
-        try:
-            self._session.move({path: float(column[at]) for path, column in self._path.items()})
-        except InputError as error:
-            self._player.pause()
-            refuse(str(error))
-        else:
-            self._on_change()
+        place = min(int(self._player.slider.value), self.count - 1)
+        pose = {path: float(column[place]) for path, column in self._path.items()}
+        _move(self._session, pose, self._player, self._on_change)
 
 
 def poses_between(kept: list[dict[str, float]]) -> Poses:
@@ -195,18 +190,25 @@ def poses_between(kept: list[dict[str, float]]) -> Poses:
     return {path: np.interp(places, range(len(kept)), [pose[path] for pose in kept]) for path in kept[0]}
 
 
-FORCE, SPEED, TORQUE, POWER, TOOL = "Force", "Speed", "Motor", "Power", "Tool"
-"""Kinds of curves, as their buttons name them."""
-FRAMES = 100
-"""Steps of a motion that is played: a movement to the eye, and each is a whole analysis."""
-FRAME_PERIOD = 0.12
-"""Seconds between two steps, if the computer keeps up: the longest at which they still look like a motion."""
-POINTS_SHOWN = 300
-"""Points of a curve: about as many as it has pixels across."""
-NO_MOTION = (
-    "No motion yet: open a CSV file of one (poses with times, poses with a feed rate, or sines), or name it in a "
-    'requirement of the file, { fits = "MOTOR", motion = "motion.csv" }.'
-)
+def _move(session: Session, pose: Mapping[str, float], player: Player, on_change: Callable[[], None]) -> None:
+    """Move the machine of a session to a pose of the motion that is played; stop where the pose is refused."""
+    try:
+        session.move(pose)
+    except InputError as error:
+        player.pause()
+        refuse(str(error))
+    else:
+        on_change()
+
+
+class CurveKind(StrEnum):
+    """Kinds of curves of a motion, as their buttons name them."""
+
+    FORCE = "Force"
+    SPEED = "Speed"
+    MOTOR = "Motor"
+    POWER = "Power"
+    TOOL = "Tool"
 
 
 class DrivesPanel(Panel):
@@ -221,11 +223,8 @@ class DrivesPanel(Panel):
         self._text = ""
         self._lane = Lane(drives_along, self._deliver)
         with ui.row().classes("panel-tools"):
-            self.upload = upload_field(self._open, refuse, "drives-upload", ".csv")
-            icon_button(
-                "folder_open", "Open a CSV file of a motion", lambda: self.upload.run_method("pickFiles"), "drives-open"
-            )
-            self.kind = toggle([FORCE, SPEED, TORQUE, POWER, TOOL], FORCE, self._draw, "drives-kind")
+            csv_button("Open a CSV file of a motion", self._open, "drives")
+            self.kind = toggle([kind.value for kind in CurveKind], CurveKind.FORCE.value, self._draw, "drives-kind")
         self.about = ui.html(paragraph(NO_MOTION), sanitize=False).mark("drives-about")
         with ui.element("div").classes("vibration") as self.content:
             with ui.row().classes("panel-tools"):
@@ -262,43 +261,45 @@ class DrivesPanel(Panel):
         self._asked = self._session.machine
         self._lane.ask(MotionRequest(self._session.machine, self._text))
 
-    async def _open(self, event: events.UploadEventArguments) -> None:
-        data, name = await event.file.read(), event.file.name
-        self.upload.reset()
-        try:
-            self._text = text_of(data, name, "CSV")
-        except InputError as error:
-            refuse(str(error))
-        else:
-            self._ask()
+    def _open(self, text: str) -> None:
+        self._text = text
+        self._ask()
 
-    def _deliver(self, _request: MotionRequest, new: DriveLoads | str) -> None:
-        self._answer = None if isinstance(new, str) or new.curves is None else new
-        self._show_content(self._answer is not None)
-        self.further.set_content("")
-        if isinstance(new, str) or new.curves is None:
-            self.about.set_content(paragraph((new if isinstance(new, str) else new.message) or NO_MOTION))
+    def _deliver(self, _request: MotionRequest, answer: DriveLoads | str) -> None:
+        """Show the curves of a motion, or the reason why there are none."""
+        if isinstance(answer, str) or answer.curves is None:
+            self._answer = None
+            self._show_content(False)
+            self.about.set_content(paragraph((answer if isinstance(answer, str) else answer.message) or NO_MOTION))
+            self.further.set_content("")
             return
-        first, *others = (sentence for _, sentence in DRIVES.sentences(new))
+        self._answer = answer
+        self._show_content(True)
+        first, *others = (sentence for _, sentence in DRIVES.sentences(answer))
         self.about.set_content(paragraph(first, "lead"))
         self.further.set_content("".join(paragraph(text) for text in others))
-        self._player.slider.set_value(0)
+        self._player.slider.set_value(0)  # if it was elsewhere, the machine also goes to the beginning of the motion
         self._draw()
 
-    def _show_content(self, shown: bool) -> None:
-        self.content.set_visibility(shown)
-        self.kind.set_visibility(shown)
+    def _show_content(self, is_shown: bool) -> None:
+        self.content.set_visibility(is_shown)
+        self.kind.set_visibility(is_shown)
 
     def _draw(self) -> None:
-        answer = self._answer
-        if answer is None or answer.curves is None:
+        if self._answer is None:
             return
-        times = np.linspace(answer.motion.times[0], answer.motion.times[-1], POINTS_SHOWN)
-        label, unit, lines = curves_of(answer, str(self.kind.value), times)
-        shown = [{"name": name, "values": finite(row)} for name, row in lines]
-        labels = {"x": "time (s)", "y": label}
-        options = {"signed": True, "here": self._time_shown, "across": "s", "unit": unit}
-        self.curves.run_method("show", {"x": finite(times), "lines": shown, "label": labels, **options})
+        times = np.linspace(self._answer.motion.times[0], self._answer.motion.times[-1], POINTS_SHOWN)
+        plot = plot_of(self._answer, CurveKind(str(self.kind.value)), times)
+        data = {
+            "x": finite(times),
+            "lines": [{"name": name, "values": finite(values)} for name, values in plot.lines],
+            "label": {"x": "time (s)", "y": plot.label},
+            "signed": True,
+            "here": self._time_shown,
+            "across": "s",
+            "unit": plot.unit,
+        }
+        self.curves.run_method("show", data)
 
     @property
     def _time_shown(self) -> float:
@@ -311,17 +312,11 @@ class DrivesPanel(Panel):
     def _go(self) -> None:
         if self._answer is None or self._session is None or self._asked is None:
             return
-        motion, moment = self._answer.motion, self._time_shown
-        self.time.set_text(f"{moment:.3f} s")
-        self.curves.run_method("mark", moment)
-        pose = {POSE + name: float(np.interp(moment, motion.times, row)) for name, row in motion.path.pose.items()}
-        try:
-            self._session.move(pose)
-        except InputError as error:
-            self._player.pause()
-            refuse(str(error))
-        else:
-            self.show_change()
+        motion, time = self._answer.motion, self._time_shown
+        self.time.set_text(f"{time:.3f} s")
+        self.curves.run_method("mark", time)
+        pose = {POSE + name: float(np.interp(time, motion.times, row)) for name, row in motion.path.pose.items()}
+        _move(self._session, pose, self._player, self.show_change)
 
 
 def _apart_from_pose(machine: Machine) -> tuple[object, ...]:
@@ -330,34 +325,54 @@ def _apart_from_pose(machine: Machine) -> tuple[object, ...]:
     return machine.name, machine.family.name, machine.requirements, numbers
 
 
-def curves_of(answer: DriveLoads, kind: str, times: Array) -> tuple[str, str, list[tuple[str, Array]]]:
-    """Return the curves of an answer at some times: the label of their axis, their unit, and each with its name.
+class Plot(NamedTuple):
+    """The label of an upright axis, its unit, and the curves over it, each with its name."""
 
-    Drives of the kind of the first one are drawn, so that all have one unit.
+    label: str
+    unit: str
+    lines: list[tuple[str, Array]]
+
+
+def plot_of(answer: DriveLoads, kind: CurveKind, times: Array) -> Plot:
+    """Return the curves of one kind at some times.
 
     Args:
         answer: an answer with curves.
-        kind: the kind of curve, as the panel offers them.
+        kind: the kind of curve.
         times: s.
     """
-    display, moments = answer.machine.display, answer.motion.times
-    if kind == TOOL and answer.deflection is not None:
-        scale = display.deflection("m")
-        rows = [np.interp(times, moments, row) for row in answer.deflection[:, 3:].T]
-        lines = [("at rest", np.linalg.norm(rows, axis=0) * scale.factor)]
-        if answer.along_modes is not None and answer.along_modes.modes:
-            surplus = [np.interp(times, answer.along_modes.times, row) for row in answer.along_modes.surplus[:, 3:].T]
-            lines.append(("modes", np.linalg.norm(np.add(rows, surplus), axis=0) * scale.factor))
-        return scale.label("deflection of the tool"), scale.unit, lines
+    return _tool_plot(answer, times) if kind is CurveKind.TOOL else _drive_plot(answer, kind, times)
+
+
+def _tool_plot(answer: DriveLoads, times: Array) -> Plot:
+    """Return the deflection of the tool: as if the machine stood still, and with its modes where these are known."""
+    if answer.deflection is None:
+        raise ValueError("an answer without curves has no deflection")
+    scale = answer.machine.display.deflection("m")
+    rest = [np.interp(times, answer.motion.times, row) for row in answer.deflection[:, 3:].T]
+    lines = [("at rest", np.linalg.norm(rest, axis=0) * scale.factor)]
+    if answer.along_modes is not None and answer.along_modes.modes:
+        surplus = [np.interp(times, answer.along_modes.times, row) for row in answer.along_modes.surplus[:, 3:].T]
+        lines.append(("modes", np.linalg.norm(np.add(rest, surplus), axis=0) * scale.factor))
+    return Plot(scale.label("deflection of the tool"), scale.unit, lines)
+
+
+def _drive_plot(answer: DriveLoads, kind: CurveKind, times: Array) -> Plot:
+    """Return a curve for each drive, by its number.
+
+    Drives of the kind of the first one are drawn, sliding or turning, so that all have one unit.
+    """
     if answer.curves is None:
-        return "", "", []
-    first = answer.drives[0]
+        raise ValueError("an answer without curves cannot be drawn")
+    display, first = answer.machine.display, answer.drives[0]
     length, force, torque = map(display.scale, (motion_unit(not first.slides), first.unit, first.motor_unit))
-    curve, factor, unit, word = {
-        SPEED: (answer.curves.speed, length.factor, f"{length.unit}/s", "speed"),
-        TORQUE: (answer.curves.motor_torque, torque.factor, torque.unit,
-                 "torque of the motor" if first.rotary else "force of the motor"),
-        POWER: (answer.curves.power, 1.0, "W", "power of the motor"),
-    }.get(kind, (answer.curves.force, force.factor, force.unit, "force"))  # fmt: skip
-    alike = [k for k, drive in enumerate(answer.drives) if drive.slides is first.slides]
-    return f"{word} ({unit})", unit, [(f"{k + 1}", np.interp(times, moments, curve[k]) * factor) for k in alike]
+    curves, motor_word = answer.curves, "torque of the motor" if first.rotary else "force of the motor"
+    values, factor, unit, word = {
+        CurveKind.FORCE: (curves.force, force.factor, force.unit, "force"),
+        CurveKind.SPEED: (curves.speed, length.factor, f"{length.unit}/s", "speed"),
+        CurveKind.MOTOR: (curves.motor_torque, torque.factor, torque.unit, motor_word),
+        CurveKind.POWER: (curves.power, 1.0, "W", "power of the motor"),
+    }[kind]
+    numbers = [k for k, drive in enumerate(answer.drives) if drive.slides is first.slides]
+    lines = [(f"{k + 1}", np.interp(times, answer.motion.times, values[k]) * factor) for k in numbers]
+    return Plot(f"{word} ({unit})", unit, lines)

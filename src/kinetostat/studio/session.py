@@ -111,16 +111,15 @@ class Session:
             Whether it is of the same kind, so that all controls are still valid.
         """
         same_family = machine.family.name == self.machine.family.name
-        alike = same_family and values(machine).keys() == values(self.machine).keys()
-        if alike:
-            step = (TYPED_TEXT,) if typed else ()
-            if not typed or self._open_step != step:
-                self._close_step()
-                self._note()
-            self.machine, self._open_step = machine, step
-        else:
+        if not same_family or values(machine).keys() != values(self.machine).keys():
             self._start(Memory(machine))
-        return alike
+            return False
+        step = (TYPED_TEXT,) if typed else ()
+        if not typed or self._open_step != step:
+            self._close_step()
+            self._note()
+        self.machine, self._open_step = machine, step
+        return True
 
     def value(self, path: str) -> float:
         """Return the SI value of a control; the first one if it moves several entries."""
@@ -138,7 +137,7 @@ class Session:
             InputError: the machine cannot have this value; it stays as it was.
         """
         control = self.controls[path]
-        self._change(dict.fromkeys(control.parameter.leaves, control.value_at(position)))
+        self.move(dict.fromkeys(control.parameter.leaves, control.value_at(position)))
 
     def settle(self) -> None:
         """End the open step, and check the numbers that changed against all others.
@@ -166,25 +165,22 @@ class Session:
         value = read_typed(parameter, text, unit)
         present = values(self.machine)
         if any(present[leaf] != value for leaf in parameter.leaves):
-            self._change(dict.fromkeys(parameter.leaves, value))
+            self.move(dict.fromkeys(parameter.leaves, value))
             self.settle()
 
-    def move(self, where: Mapping[str, float]) -> None:
+    def move(self, numbers: Mapping[str, float]) -> None:
         """Set several numbers at once, in SI, as a click on the map does; repeated moves of the same are one step.
 
         Raises:
-            InputError: the machine cannot have them.
+            InputError: the machine cannot have them, or those that were changed before contradict each other.
         """
-        self._change(where)
-
-    def _change(self, numbers: Mapping[str, float]) -> None:
         step = tuple(numbers)
         if self._open_step != step:
             self.settle()
-        new = self.machine.with_drafted_values(numbers)
+        machine = self.machine.with_drafted_values(numbers)  # first, so that a refusal leaves no step in the history
         if self._open_step != step:
             self._note()
-        self.machine, self._open_step = new, step
+        self.machine, self._open_step = machine, step
 
     def show_loaded(self, loaded: bool) -> None:
         """Show the machine at rest under its loads, or without them, as `state` in [load] says it."""

@@ -152,7 +152,7 @@ class VibrationPanel(Panel):
         except InputError as error:
             self.mass.complain(str(error))
         else:
-            self.mass.take()
+            self.mass.replace_typed_text()
             self.show_change()
 
     def _offer_directions(self, new: Ringing) -> None:
