@@ -8,7 +8,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load
 from kinetostat.studies.attribution import ranking_of
 from kinetostat.studies.vibration import modes
-from kinetostat.studio.answers import SwingRequest, ringing, swing
+from kinetostat.studio.answers import SwingRequest, modes_and_response, swing
 from kinetostat.views.scene.anatomy import proportions_of
 from kinetostat.views.vibration import percent
 
@@ -112,7 +112,7 @@ def test_a_rotor_without_transmission_is_said_where_its_frequencies_are_asked_fo
 def test_a_swing_goes_through_the_machine_as_it_is_and_as_far_as_a_deflection(name):
     machine = load(name, ["tool.mass=3"])
     configuration = respond(machine).configuration
-    sizes, answer = proportions_of(machine, configuration), ringing(machine).answer
+    sizes, answer = proportions_of(machine, configuration), modes_and_response(machine).answer
     for number in range(len(answer.modes)):
         solids = swing(SwingRequest(answer, number, sizes))
         wires = [solid for solid in solids if solid["shape"]["kind"] == "swept"]

@@ -1,14 +1,14 @@
-"""The computations behind the page: a picture, a report, a map, curves, a ranking, modes and their swing.
+"""The computations behind the page: a picture, a report, a map, curves, a ranking, modes, their swing, a motion.
 
-Each is a function of a request. They run in threads (`lanes`), so they take and return frozen data and touch no page.
-The formulas are elsewhere.
+Each is a function of a request, which stands before it with its answer. They run in threads (`lanes`), so they take and
+return frozen data and touch no page. The formulas are elsewhere.
 """
 
 import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -48,6 +48,12 @@ SLOW_POINTS = 11
 CURVE_POINTS = 61
 """Points of a curve: it looks smooth on a page."""
 SINGULARITY = "singularity_margin"
+RESPONSE_POINTS = 300
+"""Frequencies of a response over its range: about as many as a small plot has pixels across."""
+POINTS_ABOUT_MODE = 40
+"""Further frequencies about each mode, whose peak is narrower than a pixel."""
+MOTION_FILE = Path("motion.csv")
+"""Name of a motion in messages."""
 
 
 @dataclass(frozen=True)
@@ -79,19 +85,19 @@ def picture(request: PictureRequest) -> Picture:
     """Draw the machine at its pose; at a singular pose, together with the motion that stays free."""
     state = state_of(request.machine)
     response, status = state.response, state.status
-    if status is not Status.OK and not _drawable(status, response):
+    if status is not Status.OK and not _has_picture(status, response):
         return Picture(status, None)
     scene = scenes.machine_scene(request.machine, response.configuration, request.sizes)
     if status is Status.SINGULAR and not request.machine.loaded:
         scene = _with_free_twist(scene, response, request.sizes)
-    grips = [handle.as_data() for handle in handles(response.configuration, request.axes)]
-    return Picture(status, {**as_data(scene), "handles": grips, "fit": request.fit})
+    handle_data = [handle.as_data() for handle in handles(response.configuration, request.axes)]
+    return Picture(status, {**as_data(scene), "handles": handle_data, "fit": request.fit})
 
 
-def _drawable(status: Status, response: Response) -> bool:
+def _has_picture(status: Status, response: Response) -> bool:
     """Return whether a pose without an answer has a picture: each joint has its place."""
-    points = [c for leg in response.configuration.legs for p in leg.path for c in p.components()]
-    return status not in PLACELESS and all(math.isfinite(c) for c in points)
+    coordinates = (c for leg in response.configuration.legs for point in leg.path for c in point.components())
+    return status not in PLACELESS and all(math.isfinite(coordinate) for coordinate in coordinates)
 
 
 def _with_free_twist(scene: Scene, response: Response, sizes: Proportions) -> Scene:
@@ -209,21 +215,21 @@ def quantity_map(request: MapRequest) -> dict[str, Array] | str:
 
 
 def _values_of(request: MapRequest) -> dict[str, Array]:
-    modal = QUANTITIES[request.quantity].modal
-    machine = request.machine if modal else _without_load(request.machine)
-    present, family = values(machine), machine.family
-    leaves = [find(family, ends.path).leaves for ends in (request.across, request.up)]
-    varied = {leaf for paths in leaves for leaf in paths}
-    slow = modal and without_derivatives(machine, [request.quantity], sorted(varied)) is not None
-    points = SLOW_POINTS if slow else MAP_POINTS
+    is_modal = QUANTITIES[request.quantity].modal
+    machine = request.machine if is_modal else _without_load(request.machine)
+    present, sides = values(machine), (request.across, request.up)
+    leaves = [find(machine.family, ends.path).leaves for ends in sides]
+    varied = {leaf for leaves_of_side in leaves for leaf in leaves_of_side}
+    has_no_program = is_modal and without_derivatives(machine, [request.quantity], sorted(varied)) is not None
+    points = SLOW_POINTS if has_no_program else MAP_POINTS
     axes = [
-        Axis(paths, np.linspace(ends.low, ends.high, points))
-        for paths, ends in zip(leaves, (request.across, request.up), strict=True)
+        Axis(leaves_of_side, np.linspace(ends.low, ends.high, points))
+        for leaves_of_side, ends in zip(leaves, sides, strict=True)
     ]
     fixed = [path for path in present if path.startswith("pose.") and path not in varied]
     grid = Grid([*axes, *(Axis((path,), np.array([float(present[path])])) for path in fixed)])
-    wanted = [request.quantity] if modal else [*_linear_quantities(machine), SINGULARITY]
-    return evaluate(machine, grid, wanted, repeated=not slow).values
+    quantities = [request.quantity] if is_modal else [*_linear_quantities(machine), SINGULARITY]
+    return evaluate(machine, grid, quantities, repeated=not has_no_program).values
 
 
 def _without_load(machine: Machine) -> Machine:
@@ -293,53 +299,56 @@ def _linear_quantities(machine: Machine) -> dict[str, str]:
     return {f"{group}_{name}": f"{group.replace('_', ' ')} {name}" for group in groups for name in names}
 
 
-def weighs(machine: Machine) -> bool:
-    """Return whether any number of a machine says a mass or an inertia."""
+def has_mass(machine: Machine) -> bool:
+    """Return whether any mass or inertia of a machine is not zero."""
     present = values(machine)
-    weighing = [p for p in parameters(machine.family) if KINDS[p.quantity.kind].heavy or p.quantity.kind == "inertia"]
-    return any(present[leaf] for parameter in weighing for leaf in parameter.leaves)
+    return any(
+        present[leaf]
+        for parameter in parameters(machine.family)
+        if KINDS[parameter.quantity.kind].heavy or parameter.quantity.kind == "inertia"
+        for leaf in parameter.leaves
+    )
 
 
 def _frequencies(machine: Machine) -> dict[str, str]:
     """Return the lowest natural frequencies: as many as a platform has whose file gives a mass and no more."""
-    if not weighs(machine):
+    if not has_mass(machine):
         return {}
     group = "loaded_frequency" if machine.loaded else "frequency"
     axes = [name for name in machine.family.component_names if name in "xyz"]
     return {f"{group}_{number}": f"frequency {number}" for number in range(1, len(axes) + 1)}
 
 
-RESPONSE_POINTS = 300
-"""Frequencies of a response over its range: about as many as a small plot has pixels across."""
-POINTS_ABOUT_MODE = 40
-"""Further frequencies about each mode, whose peak is narrower than a pixel."""
+class ToolResponse(NamedTuple):
+    """The receptance of the tool, SI [frequencies x 6 x 6], at frequencies in Hz [frequencies]."""
+
+    frequencies: Array
+    receptance: Complex
 
 
 @dataclass(frozen=True)
-class Ringing:
-    """The vibrations of a machine, and how its tool feels varying forces.
+class ModesAndResponse:
+    """The vibrations of a machine, and the response of its tool to varying forces.
 
     Attributes:
-        answer: modes at the pose; none where it has no answer or nothing can ring.
-        frequencies: the frequencies of the response, Hz [frequencies]; none where there are no modes.
-        receptance: the receptance of the tool, SI [frequencies x 6 x 6].
+        answer: modes at the pose; none where the pose has no answer or nothing can vibrate.
+        response: the response of the tool; None where there are no modes.
     """
 
     answer: Vibration
-    frequencies: Array | None = None
-    receptance: Complex | None = None
+    response: ToolResponse | None = None
 
 
-def ringing(machine: Machine) -> Ringing | str:
+def modes_and_response(machine: Machine) -> ModesAndResponse | str:
     """Find modes and response of a machine at its pose, or say what it lacks, which is a mass as a rule."""
     try:
         answer = modes(machine)
     except InputError as error:
         return str(error)
     if not answer.modes:
-        return Ringing(answer)
+        return ModesAndResponse(answer)
     frequencies = frequency_range(answer, points=RESPONSE_POINTS, near=POINTS_ABOUT_MODE)
-    return Ringing(answer, frequencies, answer.receptance(frequencies.tolist()))
+    return ModesAndResponse(answer, ToolResponse(frequencies, answer.receptance(frequencies.tolist())))
 
 
 @dataclass(frozen=True)
@@ -363,10 +372,6 @@ def swing(request: SwingRequest) -> list[dict[str, Any]]:
     if shape is None:
         return []
     return swing_data(machine, request.answer.state.configuration, request.sizes, shape)
-
-
-MOTION_FILE = Path("motion.csv")
-"""Name of a motion in messages."""
 
 
 @dataclass(frozen=True)
