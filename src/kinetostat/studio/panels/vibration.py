@@ -267,7 +267,7 @@ def direction_phrase(name: str) -> str:
 def mode_columns(answer: Vibration) -> tuple[list[str], list[list[float]], list[list[str]]]:
     """Return the heads of the table of modes, numbers to sort its columns by, and its texts.
 
-    Columns of words are sorted by the alphabet.
+    Frequencies and masses are sorted as numbers, the other columns by the alphabet.
     """
     modes, display = answer.modes, answer.machine.display
     texts = [
@@ -280,11 +280,9 @@ def mode_columns(answer: Vibration) -> tuple[list[str], list[list[float]], list[
         ]
         for mode in modes
     ]
-    _, directions, _, strained_parts, moving_parts = (
-        _alphabetical_ranks(column) for column in zip(*texts, strict=True)
-    )
-    masses = [min(mode.modal_mass, LARGEST_MASS) for mode in modes]
-    columns = ([mode.frequency for mode in modes], directions, masses, strained_parts, moving_parts)
+    columns = [_alphabetical_ranks(column) for column in zip(*texts, strict=True)]
+    columns[0] = [mode.frequency for mode in modes]
+    columns[2] = [min(mode.modal_mass, LARGEST_MASS) for mode in modes]
     return MODE_HEADS, [list(row) for row in zip(*columns, strict=True)], texts
 
 
