@@ -251,7 +251,7 @@ class StudyForm:
             table.setdefault("goal", "minimize")
         with ui.element("div").classes("form-aim"):
             write_goal = partial(self._write_goal, table)
-            _list_field(GOALS, table.get("goal") or usual, "goal", write_goal, f"objective {place} goal")
+            _list_field(GOALS, str(table.get("goal") or usual), "goal", write_goal, f"objective {place} goal")
             self._quantity(table, "objective", place)
             if len(self.draft.objectives) > 1:
                 drop = partial(self._drop, self.draft.objectives, place)
