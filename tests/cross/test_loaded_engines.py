@@ -17,7 +17,7 @@ from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loads import located_members
 from kinetostat.validation import exudyn_machine
 from kinetostat.validation.comparison import KNOWN
-from kinetostat.validation.exudyn_machine import modal_frequencies, weigh
+from kinetostat.validation.exudyn_machine import add_masses, modal_frequencies
 from kinetostat.validation.machine_from_file import machine_from_file
 from kinetostat.validation.pieces import bodies_before
 from kinetostat.vibration.modes import frequencies
@@ -60,7 +60,7 @@ class Engine:
         unit = float(np.max(np.abs(model.system.ComputeLinearizedSystem(exudyn_machine.settings_of(model))[1])))
         self.model, self.platform = exudyn_machine.build(configuration, reference, unit, preloaded=True)
         kinds = (self.model.items.Torque, self.model.items.Force)
-        marker = self.model.marker(self.platform, self.platform.origin, np.eye(3))
+        marker = self.model.add_marker(self.platform, self.platform.origin, np.eye(3))
         self.loads = [self.model.system.AddLoad(kind(markerNumber=marker, loadVector=[0.0] * 3)) for kind in kinds]
         self._weigh()
         self.model.system.Assemble()
@@ -84,7 +84,7 @@ class Engine:
     def _pull(self, body, point, force):
         if body.node is None or not np.any(force):
             return
-        marker = self.model.marker(body, np.array(point.components(), dtype=float), np.eye(3))
+        marker = self.model.add_marker(body, np.array(point.components(), dtype=float), np.eye(3))
         self.model.system.AddLoad(
             self.model.items.Force(markerNumber=marker, loadVector=(force / self.model.unit).tolist())
         )
@@ -213,7 +213,7 @@ def test_frequencies_about_the_loaded_state_are_those_of_exudyn(what):
     joints = solve_joints(machine) if machine.family.chains else None
     loaded = frequencies(at_rest(mechanism_of(machine, respond(machine, joints).configuration, joints)).balance)[0]
     engine = Engine(machine)
-    weigh(engine.model, engine.platform, machine, machine_from_file(machine, engine.response, engine.joints))
+    add_masses(engine.model, engine.platform, machine, machine_from_file(machine, engine.response, engine.joints))
     engine.model.system.Assemble()
     engine.start = engine.model.system.systemData.GetODE2Coordinates()
     engine.displacement(wrench_of(machine))
@@ -261,13 +261,13 @@ def test_cables_that_go_slack_are_those_of_exudyn():
     assert 1 <= len(state.slack_legs) <= 4
     at = np.array([0.0, 0.0, 2.0])
     model = exudyn_machine.Multibody(STRETCH)
-    platform = model.body(at)
+    platform = model.add_body(at)
 
     def tension(mbs, t, item, stretch, speed, stiffness, damping, force):
         return max(stiffness * stretch + force, 0.0)
 
     for corner, eye in zip(CORNERS, EYES, strict=True):
-        markers = [model.marker(body, p, np.eye(3)) for body, p in ((model.ground, corner), (platform, eye))]
+        markers = [model.add_marker(body, p, np.eye(3)) for body, p in ((model.ground, corner), (platform, eye))]
         model.system.AddObject(
             model.items.SpringDamper(
                 markerNumbers=markers,
@@ -277,8 +277,8 @@ def test_cables_that_go_slack_are_those_of_exudyn():
                 springForceUserFunction=tension,
             )
         )
-    tip = model.marker(platform, at, np.eye(3))
-    heavy = model.marker(platform, np.add(at, [0.02, 0.01, 0.05]), np.eye(3))
+    tip = model.add_marker(platform, at, np.eye(3))
+    heavy = model.add_marker(platform, np.add(at, [0.02, 0.01, 0.05]), np.eye(3))
     loads = [
         model.system.AddLoad(kind(markerNumber=tip, loadVector=[0.0] * 3))
         for kind in (model.items.Torque, model.items.Force)

@@ -38,7 +38,9 @@ class Multibody:
     """A system of bodies in Exudyn, with forces measured in a chosen unit.
 
     Attributes:
-        engine, items: the imported package and its vocabulary.
+        engine: the imported package.
+        items: its module of classes for nodes, bodies, markers and connectors.
+        container: what owns the system, which would be gone without it.
         system: its `MainSystem`.
         ground: the base.
         unit: force in N that is 1 in the engine: with the greatest stiffness near 1 its solver distinguishes small
@@ -57,12 +59,12 @@ class Multibody:
         self.unit, self.preloaded = unit, preloaded
         self.chains: list[list[EngineBody]] = []
 
-    def body(self, origin: Array) -> EngineBody:
+    def add_body(self, origin: Array) -> EngineBody:
         """Add a body without mass with its frame at a point (m)."""
         node = int(self.system.AddNode(self.items.NodeRigidBodyRxyz(referenceCoordinates=[*origin, 0.0, 0.0, 0.0])))
         return EngineBody(self._add_rigid(node, 0.0, np.zeros(3), np.zeros((3, 3))), node, origin)
 
-    def weigh(self, body: EngineBody, mass: float, centre: Array, inertia: Array) -> None:
+    def add_mass(self, body: EngineBody, mass: float, centre: Array, inertia: Array) -> None:
         """Add a mass (kg) to a body, with its centre at a point (m) and its inertia about it (kg·m² [3 x 3])."""
         if body.node is not None:
             self._add_rigid(body.node, mass, centre - body.origin, inertia)
@@ -79,21 +81,23 @@ class Multibody:
             )
         )
 
-    def rod(self, bodies: Sequence[EngineBody], ends: Sequence[Array], mass: float) -> None:
-        """Add a straight uniform rod (kg) between points of two bodies (m), whose ends may come nearer to each other.
+    def add_rod(self, bodies: Sequence[EngineBody], ends: Sequence[Array], mass: float) -> None:
+        """Add the mass (kg) of a straight uniform rod between points of two bodies (m); its length may change.
 
-        Its points move as its ends do in proportion, so that its kinetic energy is m/6 (v1² + v1·v2 + v2²). Its ends
-        are nodes of an element with that matrix of mass, exactly at the points of the bodies, however these are placed.
+        The velocity of its points is interpolated between those of its ends, so that its kinetic energy is
+        m/6 (v1² + v1·v2 + v2²). Its ends are nodes of an element with that matrix of mass, exactly at the points of the
+        bodies, however these are placed.
         """
         nodes = [self.system.AddNode(self.items.NodePoint(referenceCoordinates=list(end))) for end in ends]
         matrix = np.kron([[2.0, 1.0], [1.0, 2.0]], np.eye(3)) * (mass / 6.0 / self.unit)
         self._add_mass_matrix(nodes, np.asarray(matrix, dtype=float))
         for body, end, node in zip(bodies, ends, nodes, strict=True):
             place = self.items.MarkerBodyPosition(bodyNumber=body.number, localPosition=end - body.origin)
-            markers = [self.items.MarkerNodePosition(nodeNumber=node), place]
-            self.system.AddObject(self.items.SphericalJoint(markerNumbers=[self.system.AddMarker(m) for m in markers]))
+            markers = (self.items.MarkerNodePosition(nodeNumber=node), place)
+            numbers = [self.system.AddMarker(marker) for marker in markers]
+            self.system.AddObject(self.items.SphericalJoint(markerNumbers=numbers))
 
-    def rotor(self, bodies: Sequence[EngineBody], joint: Joint, inertia: float) -> None:
+    def add_rotor(self, bodies: Sequence[EngineBody], joint: Joint, inertia: float) -> None:
         """Add a rotor that turns with the motion between two unloaded bodies.
 
         It is an element with a matrix of mass over the coordinates of both bodies, at the place where they were built.
@@ -124,7 +128,7 @@ class Multibody:
             )
         )
 
-    def marker(self, body: EngineBody, point: Array, axes: Array) -> int:
+    def add_marker(self, body: EngineBody, point: Array, axes: Array) -> int:
         """Add a frame on a body, at a point (m) with the given axes as columns (base frame)."""
         place = self.engine.HT(rotation=axes, translation=point - body.origin)
         return int(self.system.AddMarker(self.items.MarkerBodyRigid(bodyNumber=body.number, localHT=place)))
@@ -144,9 +148,9 @@ class Multibody:
             frame: point (m) and axes (columns) of the six components, base frame.
             constrained: whether each of these is constrained.
             stiffness: stiffness of the springs, N·m/rad, N/rad, N/m [6 x 6]; diagonal if there is a preload.
-            preload: preload of the springs, N·m and N [6].
+            preload: preload of the springs, N·m and N [6]; only springs with a stiffness carry one.
         """
-        markers = [self.marker(body, *frame) for body in bodies]
+        markers = [self.add_marker(body, *frame) for body in bodies]
         if any(constrained):
             axes = [int(constrained[i]) for i in TRANSLATION_FIRST]
             self.system.AddObject(self.items.GenericJoint(markerNumbers=markers, constrainedAxes=axes))
@@ -154,13 +158,15 @@ class Multibody:
             matrix = stiffness[np.ix_(TRANSLATION_FIRST, TRANSLATION_FIRST)] / self.unit
             spring = self.items.RigidBodySpringDamper(markerNumbers=markers, stiffness=matrix)
             if self.preloaded and preload is not None:
-                sizes = np.where(np.diag(stiffness) > 0.0, np.diag(stiffness), 1.0)
-                spring.offset = (-preload / sizes)[TRANSLATION_FIRST].tolist()  # it carries K (u - offset)
+                divisors = np.where(np.diag(stiffness) > 0.0, np.diag(stiffness), 1.0)
+                spring.offset = (-preload / divisors)[TRANSLATION_FIRST].tolist()  # it carries K (u - offset)
             self.system.AddObject(spring)
 
-    def bar(self, bodies: Sequence[EngineBody], ends: Sequence[Array], stiffness: float, preload: float = 0.0) -> None:
+    def add_bar(
+        self, bodies: Sequence[EngineBody], ends: Sequence[Array], stiffness: float, preload: float = 0.0
+    ) -> None:
         """Add a spring (N/m) between a point of the near and one of the far body (m), or a bar of constant length."""
-        markers = [self.marker(body, end, np.eye(3)) for body, end in zip(bodies, ends, strict=True)]
+        markers = [self.add_marker(body, end, np.eye(3)) for body, end in zip(bodies, ends, strict=True)]
         length = float(np.linalg.norm(ends[1] - ends[0]))
         if math.isinf(stiffness):
             bar = self.items.DistanceConstraint(markerNumbers=markers, distance=length)
@@ -173,7 +179,7 @@ class Multibody:
             )
         self.system.AddObject(bar)
 
-    def thread(self, bodies: Sequence[EngineBody], line: tuple[Array, Array], pitch: float) -> None:
+    def add_thread(self, bodies: Sequence[EngineBody], line: tuple[Array, Array], pitch: float) -> None:
         """Couple the slide along a line (point in m, direction) to the turn about it: `pitch` m per rad."""
         point, axis = line
         markers, rows, offsets = [], [], []

@@ -47,9 +47,12 @@ BALANCED = 10.0 * float(np.finfo(float).eps)
 MOST_NEWTON_STEPS = 30
 """Steps of Newton's method at most: far more than it takes where a load step converges at all."""
 ALL = (True,) * 6
+"""All of rx ry rz x y z: constrained in a rigid connection, moving in space."""
 FACTORED_ONCE_FROM = 200
 """Coordinates from which Newton's steps share the factors of a matrix: these take the cube of the number, and most of
 the time. A few more steps are then taken, which stop somewhat farther from balance."""
+Z_AXIS = 2
+"""Number of the third axis among components: of rotations; that of translations is 3 more."""
 PLANAR_JOINT = (True, True, False, False, False, True)
 """Constrained components of rx ry rz x y z where z is the normal."""
 
@@ -140,7 +143,7 @@ def _displacements(model: Multibody, platform: EngineBody, wrenches: Array) -> A
     step does not converge the run ends, and there are fewer displacements than wrenches.
     """
     system, engine, items = model.system, model.engine, model.items
-    marker = model.marker(platform, platform.origin, np.eye(3))
+    marker = model.add_marker(platform, platform.origin, np.eye(3))
     steps = np.vstack([np.zeros(6), wrenches])
 
     def part_of_load(part: slice) -> Any:
@@ -197,27 +200,27 @@ def build(
         InputError: if the machine has a part that cannot be built.
     """
     model = Multibody(unit, preloaded)
-    platform = _body(model, array(reference), configuration.plane)
+    platform = _add_body(model, array(reference), configuration.plane)
     for leg in configuration.legs:
         chain = pieces(leg, configuration.plane, struts)
-        model.chains.append(_leg(model, chain, platform, configuration.plane))
+        model.chains.append(_add_leg(model, chain, platform, configuration.plane))
     return model, platform
 
 
-def _body(model: Multibody, at: Array, plane: Plane | None) -> EngineBody:
-    """Return a new body; in a planar machine it is constrained to the plane."""
-    body = model.body(at)
+def _add_body(model: Multibody, at: Array, plane: Plane | None) -> EngineBody:
+    """Add a body; in a planar machine it is constrained to the plane."""
+    body = model.add_body(at)
     if plane is not None:
         frame = array(plane.frame.translation), columns(plane.frame.rotation)
         model.couple((model.ground, body), frame, PLANAR_JOINT)
     return body
 
 
-def _leg(model: Multibody, chain: Sequence[Piece], platform: EngineBody, plane: Plane | None) -> list[EngineBody]:
-    """Return the bodies of one leg from ground to platform, with their connectors."""
+def _add_leg(model: Multibody, chain: Sequence[Piece], platform: EngineBody, plane: Plane | None) -> list[EngineBody]:
+    """Add the connectors of one leg and the bodies between them; return its bodies from ground to platform."""
     bodies = [model.ground]
     for piece in chain[:-1]:
-        bodies.append(_body(model, _far_point(piece, bodies[-1].origin), plane))
+        bodies.append(_add_body(model, _far_point(piece, bodies[-1].origin), plane))
     bodies.append(platform)
     if not chain:
         model.couple(bodies, (platform.origin, np.eye(3)), ALL)
@@ -236,18 +239,18 @@ def _far_point(piece: Piece, before: Array) -> Array:
 
 def _connect(model: Multibody, piece: Piece, bodies: Sequence[EngineBody], plane: Plane | None) -> None:
     if isinstance(piece, Joint):
-        _joint(model, piece, bodies, plane)
+        _add_joint(model, piece, bodies, plane)
     elif isinstance(piece, Spring):
-        _joint(model, piece.joint, bodies, plane, (float(piece.stiffness), float(piece.preload)))
+        _add_joint(model, piece.joint, bodies, plane, (float(piece.stiffness), float(piece.preload)))
     elif isinstance(piece, Beam):
-        _beam(model, piece, bodies, plane)
+        _add_beam(model, piece, bodies, plane)
     elif isinstance(piece, StrutPiece):
-        model.bar(bodies, (array(piece.start), array(piece.end)), piece.stiffness, piece.preload)
+        model.add_bar(bodies, (array(piece.start), array(piece.end)), piece.stiffness, piece.preload)
     else:
-        _parallelogram(model, piece, bodies, plane)
+        _add_parallelogram(model, piece, bodies, plane)
 
 
-def _joint(
+def _add_joint(
     model: Multibody,
     joint: Joint,
     bodies: Sequence[EngineBody],
@@ -259,13 +262,13 @@ def _joint(
     axes = _axes_around(array(joint.axis), normal)
     slides = joint.point is None
     point = bodies[0].origin if joint.point is None else array(joint.point)
-    free = 5 if slides else 2  # the third axis is that of the joint
+    free = Z_AXIS + 3 if slides else Z_AXIS  # the third axis is that of the joint
     constrained = [i != free for i in range(6)]
-    if plane is not None:
+    if plane is not None:  # the bodies are kept in the plane already; the first axis is its normal, or the third one is
         constrained = [i in ((0, 4) if slides else (3, 4)) for i in range(6)]
     if joint.pitch != 0.0:
-        constrained[5] = False
-        model.thread(bodies, (point, axes[:, 2]), float(joint.pitch))
+        constrained[Z_AXIS + 3] = False
+        model.add_thread(bodies, (point, axes[:, 2]), float(joint.pitch))
     matrix, preload = np.zeros((6, 6)), np.zeros(6)
     if spring is not None:
         matrix[free, free], preload[free] = spring
@@ -281,7 +284,7 @@ def _axes_around(axis: Array, normal: Array | None = None) -> Array:
     return np.column_stack([x, np.cross(axis, x), axis])
 
 
-def _beam(model: Multibody, beam: Beam, bodies: Sequence[EngineBody], plane: Plane | None) -> None:
+def _add_beam(model: Multibody, beam: Beam, bodies: Sequence[EngineBody], plane: Plane | None) -> None:
     """Couple bodies by the cantilever's 6x6 stiffness at the beam's end; rigid components are constrained."""
     compliance = end_compliance(beam)
     moving = ALL if plane is None else in_plane(beam, plane.frame.rotation.z)
@@ -298,14 +301,16 @@ def _beam(model: Multibody, beam: Beam, bodies: Sequence[EngineBody], plane: Pla
     model.couple(bodies, (array(beam.end), section_axes(beam)[0]), constrained, matrix if flexible else None)
 
 
-def _parallelogram(model: Multibody, piece: Parallelogram, bodies: Sequence[EngineBody], plane: Plane | None) -> None:
+def _add_parallelogram(
+    model: Multibody, piece: Parallelogram, bodies: Sequence[EngineBody], plane: Plane | None
+) -> None:
     """Add two bars between points of the bodies, which also stay in the parallelogram's plane and parallel to it."""
     normal = np.cross(array(piece.side), array(piece.far) - array(piece.near))
     if plane is None:
         axes = _axes_around(normal / np.linalg.norm(normal))
         model.couple(bodies, (array(piece.far), axes), PLANAR_JOINT)
     for near, far in piece.bars:
-        model.bar(bodies, (array(near), array(far)), float(piece.bar))
+        model.add_bar(bodies, (array(near), array(far)), float(piece.bar))
 
 
 def frequencies(machine: Machine) -> Array:
@@ -323,12 +328,12 @@ def frequencies(machine: Machine) -> Array:
     model.system.Assemble()
     unit = float(np.max(np.abs(model.system.ComputeLinearizedSystem(settings_of(model))[1])))
     model, platform = build(drawn.configuration, drawn.reference, unit, struts=struts)
-    weigh(model, platform, machine, drawn)
+    add_masses(model, platform, machine, drawn)
     model.system.Assemble()
     return modal_frequencies(model)
 
 
-def weigh(model: Multibody, platform: EngineBody, machine: Machine, drawn: MachineFromFile) -> None:
+def add_masses(model: Multibody, platform: EngineBody, machine: Machine, drawn: MachineFromFile) -> None:
     """Add the masses of platform, payload and links to the bodies of a machine.
 
     Args:
@@ -337,18 +342,18 @@ def weigh(model: Multibody, platform: EngineBody, machine: Machine, drawn: Machi
         drawn: its legs and links at the pose.
     """
     for part in on_platform(machine, drawn.configuration.platform):
-        model.weigh(platform, part.mass, part.centre, part.inertia)
+        model.add_mass(platform, part.mass, part.centre, part.inertia)
     if has_rotors(machine):
-        turn_rotors(model, machine, drawn.configuration)
+        add_rotors(model, machine, drawn.configuration)
     for link in links(drawn.members, drawn.configuration, struts=not has_rotors(machine)):
         carriers = [model.chains[link.leg][number] for number in link.bodies]
         if len(carriers) == 1:
-            model.weigh(carriers[0], link.mass, link.points[0], link.inertia)
+            model.add_mass(carriers[0], link.mass, link.points[0], link.inertia)
         elif any(body.node is not None for body in carriers):
-            model.rod(carriers, link.points, link.mass)
+            model.add_rod(carriers, link.points, link.mass)
 
 
-def turn_rotors(model: Multibody, machine: Machine, configuration: Configuration) -> None:
+def add_rotors(model: Multibody, machine: Machine, configuration: Configuration) -> None:
     """Add the rotors of actuators, which move as the springs of the actuators deflect.
 
     Args:
@@ -359,7 +364,7 @@ def turn_rotors(model: Multibody, machine: Machine, configuration: Configuration
     for leg, bodies in zip(configuration.legs, model.chains, strict=True):
         for piece, near, far in zip(pieces(leg, configuration.plane, struts=False), bodies, bodies[1:], strict=False):
             if isinstance(piece, Spring) and piece.actuated:
-                model.rotor((near, far), piece.joint, rotor_inertia(machine, piece))
+                model.add_rotor((near, far), piece.joint, rotor_inertia(machine, piece))
 
 
 def modal_frequencies(model: Multibody) -> Array:

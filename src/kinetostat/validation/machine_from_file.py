@@ -58,7 +58,7 @@ BEARINGS_TRAVEL = dict.fromkeys(("prismatic", "cylindrical", "planar", "helical"
 )
 """Whether the bearings of a joint go with the body that it moves, by the types that are written a second time here. Any
 other type is taken from its row in `JOINT_TYPES`."""
-X, Y, Z = np.eye(3)
+X, Y, Z = np.eye(3)  # unit vectors along the axes of the base frame
 BENDING_OF_TIP = 3.0
 """Stiffness k of a cantilever against turning of its chord under a force on its tip: k = 3 E I / length."""
 CRANKS_SUFFIX = "-rus"
@@ -392,12 +392,12 @@ def with_legs_of_file(machine: Machine, ours: Configuration) -> Configuration:
 
 def _rings(machine: Machine, place: Array) -> tuple[list[Array], list[Array]]:
     """Return the base and platform joints of the actuated legs, in order."""
-    geometry = machine.tables["geometry"]
+    numbers = vars(machine.tables["geometry"])
     rings = []
     for name in ("base", "platform"):
-        first, quarter = getattr(geometry, f"{name}_angle", 0.0), math.pi / 2.0
-        angles = getattr(geometry, f"{name}_angles", (first, quarter + first, -quarter - first, -first))
-        radius, height = getattr(geometry, f"{name}_radius"), getattr(geometry, f"{name}_height", 0.0)
+        first, quarter = numbers.get(f"{name}_angle", 0.0), math.pi / 2.0
+        angles = numbers.get(f"{name}_angles", (first, quarter + first, -quarter - first, -first))
+        radius, height = numbers[f"{name}_radius"], numbers.get(f"{name}_height", 0.0)
         rings.append([np.array([radius * math.cos(a), radius * math.sin(a), height]) for a in angles])
     return rings[0], [apply(place, point) for point in rings[1]]
 
@@ -446,5 +446,5 @@ def _crank(machine: Machine, number: int, ends: tuple[Array, Array], ours: Leg) 
     return [*_drive(machine, number, pivot), *bending, bar, *_ball(elbow, AXES), *stretch, *_ball(high, AXES)]
 
 
-def _ball(centre: Array, axes: Sequence[Any]) -> list[Joint]:
+def _ball(centre: Array, axes: Sequence[Vector]) -> list[Joint]:
     return [Joint(axis, vector(centre)) for axis in axes]

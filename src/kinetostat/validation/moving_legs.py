@@ -6,11 +6,12 @@ frame, placements are matrices [4 x 4].
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
@@ -20,7 +21,7 @@ from kinetostat.machine.link import Beam, Parallelogram
 from kinetostat.machine.machine import Member
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import CLOSED
-from kinetostat.validation.pieces import array, tensor_of
+from kinetostat.validation.pieces import array, joint_of, tensor_of
 
 MOST_CLOSING_STEPS = 20
 """Steps of Newton's method from coordinates that should be those of the pose already: a handful are enough, and legs
@@ -44,8 +45,7 @@ class LegPart:
     def motion(self, amount: float) -> Array:
         """Return the placement of what follows once the part has moved by an amount (rad, m) from the home pose."""
         if isinstance(self.element, Parallelogram):
-            span, swung_span, _ = _swing(self.element, amount)
-            return placement(np.eye(3), swung_span - span)
+            return placement(np.eye(3), _swing(self.element, amount).shift)
         joint = joint_in(self.element)
         axis = array(joint.axis)
         if joint.point is None:
@@ -62,7 +62,7 @@ class LegPart:
         """
         rotation = before[:3, :3]
         if isinstance(self.element, Parallelogram):
-            return np.concatenate([np.zeros(3), rotation @ _swing(self.element, amount)[2]])
+            return np.concatenate([np.zeros(3), rotation @ _swing(self.element, amount).rate])
         joint = joint_in(self.element)
         axis = rotation @ array(joint.axis)
         if joint.point is None:
@@ -90,7 +90,7 @@ class LegPart:
         if isinstance(element, Beam):
             ends = point_at(before, element.start), point_at(before, element.end)
             return Beam(element.name, *ends, direction_at(before, element.up), element.rigidity)
-        raise InputError(f"The independent engines have no {type(element).__name__}; validate the machine without one.")
+        raise _unknown_to_engines(element)
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class LegBody:
         tensor = None
         if self.inertia is not None:
             tensor = tensor_of(before[:3, :3] @ self.inertia @ before[:3, :3].T)
-        return Member(
+        return Member(  # which takes functions, because families compute these only where they are asked for
             leg=leg,
             name=self.name,
             length=float(np.linalg.norm(self.ends[1] - self.ends[0])),
@@ -185,16 +185,17 @@ class MovingLeg:
             InputError: if the leg does not reach there.
         """
         coordinates = np.array(start, dtype=float)
-        for _ in range(MOST_CLOSING_STEPS):
+        for _ in range(MOST_CLOSING_STEPS + 1):  # the placements after the last step are looked at, too
             placements = self.placements(coordinates.tolist())
             gap = _twist(target @ np.linalg.inv(placements[-1]))
             if _motion_size(gap, target, length) <= CLOSED:
                 return placements
             rates = self.rates(placements, coordinates.tolist())
             coordinates = coordinates + np.linalg.lstsq(rates, gap, rcond=None)[0]
+        missing = 1000.0 * length * _motion_size(gap, target, length)  # of an angle, the arc at that length
         raise InputError(
             f'Leg "{self.name}", as the file describes it, does not reach the platform where kinetostat places it: '
-            f"{1000.0 * length * _motion_size(gap, target, length):.3g} mm are missing. Please report this machine."
+            f"{missing:.3g} mm are missing. Please report this machine."
         )
 
     def at_pose(self, placements: Sequence[Array]) -> Leg:
@@ -220,8 +221,12 @@ class MovingLeg:
         ]
         before = [element for i, element in turning if i < number]
         after = next(element for i, element in turning if i > number)
-        start = _far_centre(before[-1]) if before else array(joint_in(chain[number]).carriage)
-        return start, array(after.near if isinstance(after, Parallelogram) else joint_in(after).point)
+        if before:
+            return _far_centre(before[-1]), _near_centre(after)
+        carriage = joint_in(chain[number]).carriage
+        if carriage is None:
+            raise ValueError(f"the rod {number} of {self.name} has neither a joint nor a carriage before it")
+        return array(carriage), _near_centre(after)
 
 
 def turn(axis: Array, angle: float) -> Array:
@@ -253,20 +258,30 @@ def direction_at(place: Array, direction: Vector) -> Vector:
     return vector(place[:3, :3] @ array(direction))
 
 
-def vector(numbers: Any) -> Vector:
+def vector(numbers: Iterable[float]) -> Vector:
     """Return three numbers as a vector."""
     return Vector(*(float(c) for c in numbers))
 
 
-def unit(direction: Any) -> Array:
+def unit(direction: npt.ArrayLike) -> Array:
     """Return a direction at unit length."""
     row = np.asarray(direction, dtype=float)
     return np.asarray(row / np.linalg.norm(row))
 
 
-def joint_in(element: Any) -> Any:
-    """Return the freedom of a joint, or of a spring."""
-    return element.joint if isinstance(element, Spring) else element
+def joint_in(element: Element) -> Joint:
+    """Return the freedom of a joint, or of a spring.
+
+    Raises:
+        InputError: the element is neither.
+    """
+    if isinstance(element, Joint | Spring):
+        return joint_of(element)
+    raise _unknown_to_engines(element)
+
+
+def _unknown_to_engines(element: Element) -> InputError:
+    return InputError(f"The independent engines have no {type(element).__name__}; validate the machine without one.")
 
 
 def _joint_at(joint: Joint, place: Array) -> Joint:
@@ -275,17 +290,29 @@ def _joint_at(joint: Joint, place: Array) -> Joint:
     return replace(joint, axis=direction_at(place, joint.axis), point=point, carriage=carriage)
 
 
-def _swing(bars: Parallelogram, amount: float) -> tuple[Array, Array, Array]:
-    """Return the vector along bars at the home pose, the same after a swing by an arc, and its rate per arc, m."""
+class _Swing(NamedTuple):
+    """The shift of the far side of a parallelogram from the home pose, m [3], and its rate per arc [3]."""
+
+    shift: Array
+    rate: Array
+
+
+def _swing(bars: Parallelogram, amount: float) -> _Swing:
+    """Swing the bars of a parallelogram by an arc, m."""
     span = array(bars.far) - array(bars.near)
     length, normal = float(np.linalg.norm(span)), unit(np.cross(array(bars.side), span))
     swung_span = turn(normal, amount / length) @ span
-    return span, swung_span, np.cross(normal, swung_span) / length
+    return _Swing(swung_span - span, np.cross(normal, swung_span) / length)
 
 
-def _far_centre(element: Any) -> Array:
+def _near_centre(element: Element) -> Array:
+    """Return the centre of a joint that turns, or of the near side of a parallelogram, m."""
+    return array(element.near if isinstance(element, Parallelogram) else joint_in(element).pivot)
+
+
+def _far_centre(element: Element) -> Array:
     """Return the centre of a joint that turns, or of the far side of a parallelogram, m."""
-    return array(element.far if isinstance(element, Parallelogram) else joint_in(element).point)
+    return array(element.far if isinstance(element, Parallelogram) else joint_in(element).pivot)
 
 
 def _twist(displacement: Array) -> Array:
@@ -295,6 +322,6 @@ def _twist(displacement: Array) -> Array:
 
 
 def _motion_size(gap: Array, target: Array, length: float) -> float:
-    """Return the size of the motion of the platform by a twist: rad, or share of the machine's length."""
+    """Return the size of a gap: the larger of its angle, rad, and of the displacement of P over the length."""
     translation = gap[3:] + np.cross(gap[:3], target[:3, 3])
     return max(float(np.linalg.norm(gap[:3])), float(np.linalg.norm(translation)) / length)

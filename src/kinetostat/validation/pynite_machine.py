@@ -14,7 +14,7 @@ import numpy as np
 from kinetostat.algebra.vector import Vector
 from kinetostat.arrays import Array
 from kinetostat.machine.leg import Joint, Leg, Spring
-from kinetostat.machine.link import Beam, Parallelogram
+from kinetostat.machine.link import Beam, Parallelogram, Rigidity
 from kinetostat.machine.machine import Configuration
 from kinetostat.spec.errors import InputError
 from kinetostat.tolerances import BLOCK_BEING_EXTRAPOLATED, SAME_NODE
@@ -94,6 +94,7 @@ def _extremes(configuration: Configuration) -> tuple[float, float]:
 
 
 def _stiffnesses(piece: Piece, length: float) -> list[float]:
+    """Return the stiffnesses of a piece, N/m, as `_extremes` compares them."""
     if isinstance(piece, Spring):
         return [float(piece.stiffness) / (1.0 if piece.joint.point is None else length**2)]
     if isinstance(piece, Beam):
@@ -160,7 +161,7 @@ class Frame:
         """Add a stiff member between two nodes, by a detour if they lie at one point; return the second node."""
         if not self._are_apart(self.points[near], self.points[far]):
             near = self.rigid(near, self.node(self.points[near] + np.array([STUB_LENGTH * self.length, 0.0, 0.0])))
-        self.member((near, far), [math.inf] * 4)
+        self.member((near, far), Rigidity())
         return far
 
     def _are_apart(self, a: Array, b: Array) -> bool:
@@ -174,25 +175,27 @@ class Frame:
         """
         size = STUB_LENGTH * self.length
         end = self.node(self.points[at] + size * axis)
-        section = [math.inf] * 4
+        rigidity = Rigidity()
         if stiffness is not None:
-            section[0 if slide else 3] = stiffness * size
-        name = self.member((at, end), section)
+            rigidity = Rigidity(axial=stiffness * size) if slide else Rigidity(torsion=stiffness * size)
+        name = self.member((at, end), rigidity)
         if stiffness is None:
             self.model.def_releases(name, **{"Dxj" if slide else "Rxj": True})
         return end
 
-    def member(self, ends: tuple[str, str], section: Sequence[float], axes: Array | None = None) -> str:
+    def member(self, ends: tuple[str, str], rigidity: Rigidity, axes: Array | None = None) -> str:
         """Add a member between two nodes; return its name.
 
         Args:
             ends: its nodes.
-            section: E A (N), E I about y and z, G J (N·m²); infinite ones become as stiff as rigid parts.
+            rigidity: of its cross-section; what is infinite becomes as stiff as rigid parts.
             axes: axes of its cross-section as columns x y z; PyNite's choice if None.
         """
-        rigid = [self.stiffness * self.length, *[self.stiffness * self.length**3] * 3]
+        section = (rigidity.axial, rigidity.bending_y, rigidity.bending_z, rigidity.torsion)
+        rigid = (self.stiffness * self.length, *(self.stiffness * self.length**3,) * 3)
+        entries = [r if math.isinf(k) else float(k) for k, r in zip(section, rigid, strict=True)]
         name = f"M{len(self.model.members)}"
-        self.model.add_section(name, *(r if math.isinf(k) else k for k, r in zip(section, rigid, strict=True)))
+        self.model.add_section(name, *entries)
         self.model.add_member(name, *ends, "unit", name)
         member = self.model.members[name]
         _keep_whole(member)
@@ -284,8 +287,7 @@ def _beam(frame: Frame, beam: Beam, axes: Array, at: str) -> str:
             f'"{beam.name}" deflects in shear, which PyNite\'s members do not; use Exudyn for this machine.'
         )
     near, far = frame.reach(at, axes.T @ array(beam.start)), frame.node(axes.T @ array(beam.end))
-    section = [float(k) for k in (rigidity.axial, rigidity.bending_y, rigidity.bending_z, rigidity.torsion)]
-    frame.member((near, far), section, axes.T @ section_axes(beam)[0])
+    frame.member((near, far), rigidity, axes.T @ section_axes(beam)[0])
     return far
 
 
