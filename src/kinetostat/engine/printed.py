@@ -95,12 +95,12 @@ def print_graph(inputs: Sequence[Traced], names: Sequence[str], results: Sequenc
         if place == len(before):
             first = len(lines)
     return Printed(
-        tuple(lines[:first]),
-        "" if condition is None else _operand(condition, written),
-        _operand(code, written),
-        tuple(lines[first:]),
-        tuple(_operand(value, written) for value in values),
-        sum(node.operation != "input" for node in used),
+        first=tuple(lines[:first]),
+        condition="" if condition is None else _operand(condition, written),
+        code=_operand(code, written),
+        then=tuple(lines[first:]),
+        results=tuple(_operand(value, written) for value in values),
+        operations=sum(node.operation != "input" for node in used),
     )
 
 

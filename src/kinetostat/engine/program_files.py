@@ -1,13 +1,14 @@
 """Compiled programs on disk, so that a new process need not trace and compile what an earlier one has compiled.
 
-Machine code cannot be judged by looking at it: who could write such a file, or change a byte of it, would decide what
-the next process does. So nothing is run that this user has not written himself. The folder belongs to the user alone
-(0700) and is opened once, its owner and rights are those of what has been opened, and every name is looked up in it;
-where others may write or read it, it is not used. Each file carries a keyed hash of its content and of its name, by a
-secret that never leaves the folder: a damaged file, a copied one, one of another program is not run but made again.
+Machine code cannot be judged by looking at it: anybody who could write such a file, or change a byte of it, would
+decide what the next process does. So nothing is run that this user has not written himself. The folder belongs to the
+user alone (0700). It is opened once; owner and rights are judged of what has been opened, and every name is looked up
+in it. Where others may write or read it, it is not used. Each file carries a keyed hash of its content and of its name,
+by a secret that never leaves the folder: a damaged file, a copied one, or one of another program is made again.
 
 A file is written under another name and then moved to its own, so that a process that is killed, or two at once, leave
-whole files; whatever the system refuses (no room, no right to write) costs the time of compiling and nothing else.
+whole files. If the system refuses something (no room, no right to write), programs are compiled again, and nothing
+else is lost.
 
 What a program is made of is said by its maker in a text (`kernel`); what else decides about its bytes is added here:
 the sources of kinetostat, LLVM, Python and the processor.
@@ -48,7 +49,7 @@ SECRET = "secret"
 """Name of the file of the folder's secret."""
 SECRET_SIZE, HASH_SIZE = 32, 32
 """Bytes of the secret and of a hash: 256 bits, which nobody can guess."""
-PRIVATE = 0o077
+RIGHTS_OF_OTHERS = 0o077
 """Bits of the rights of group and others: a folder with programs is not used where one of them is set."""
 
 
@@ -92,7 +93,7 @@ def disk_usage() -> int:
     """Return how many bytes all programs have on disk.
 
     Raises:
-        SharedFolderError: the folder is not used, because others may.
+        SharedFolderError: the folder is not used, because others may use it.
         OSError: it is not there.
     """
     with _folder() as folder, os.scandir(folder) as entries:
@@ -124,7 +125,7 @@ def _if_possible() -> Iterator[None]:
     try:
         yield
     except SharedFolderError as error:
-        warnings.warn(str(error), stacklevel=4)
+        warnings.warn(str(error), stacklevel=4)  # at the caller of read_program or write_program
     except OSError:
         pass
 
@@ -159,7 +160,7 @@ def _folder(make: bool = False) -> Iterator[int]:
 def _is_private(descriptor: int) -> bool:
     """Return whether what has been opened belongs to this user, and nobody else may use it."""
     status = os.fstat(descriptor)
-    return status.st_uid == os.geteuid() and not status.st_mode & PRIVATE
+    return status.st_uid == os.geteuid() and not status.st_mode & RIGHTS_OF_OTHERS
 
 
 def _read(folder: int, name: str) -> bytes:
@@ -270,6 +271,7 @@ def _surroundings() -> str | None:
         processor = _processor()
     except OSError:
         return None
+    # Read of the package as it was imported: it notes when this process began, s.
     if not sources or max(changed for _, _, changed in sources) > sys.modules[package.name].STARTED * 1e9:
         return None
     llvm = (compiler.origin, version.st_size, version.st_mtime_ns) if compiler and version else ()

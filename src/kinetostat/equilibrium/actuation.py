@@ -9,6 +9,7 @@ Source: theory (41) and (42). Units, axes and origin are those of `mechanism`.
 """
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +25,8 @@ from kinetostat.numerics.motions import logarithm
 from kinetostat.tolerances import BALANCED, COMMANDED, UNRESISTED
 
 MOST_CORRECTIONS = 12
-"""Greatest number of Newton's steps towards a command."""
+"""Greatest number of Newton's steps towards a command: three or four reach a pose that actuators can reach, and more
+than twelve show that they cannot."""
 
 
 @dataclass(frozen=True)
@@ -105,15 +107,15 @@ def _tensions_of_cables(mechanism: Mechanism, least: Array, most: Array, rule: R
     wrenches = []
     for leg in mechanism.legs:  # that which does no work on its passive motions, and as much as it pulls on its own
         motions = mechanism.ways.T @ np.swapaxes(leg.chain.twists, 1, 2) @ leg.chain.follows
-        wrenches.append(_solution(np.swapaxes(motions, 1, 2), leg.sign))
+        wrenches.append(_solution_or_nan(np.swapaxes(motions, 1, 2), leg.sign))
     load = platform_load(mechanism, free_state(mechanism).platform)[0] @ mechanism.ways
     tensions, exist = distribution(np.stack(wrenches, axis=2), load, least, most, rule)
     parts = [tensions[:, [place]] * leg.sign for place, leg in enumerate(mechanism.legs)]
     return np.where(exist[:, None], np.concatenate(parts, axis=1), 0.0), exist
 
 
-def _solution(matrices: Array, right: Array) -> Array:
-    """Solutions of n equations with one right side [n x size]; NaN where they are singular or have no place."""
+def _solution_or_nan(matrices: Array, right: Array) -> Array:
+    """Solutions of n equations with one right side [n x size]; NaN where matrices are singular or not finite."""
     finite: Mask = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     solvable = np.where(finite[:, None, None], matrices, np.eye(len(right)))
     regular = finite & (np.abs(np.linalg.det(solvable)) > UNRESISTED)
@@ -137,29 +139,40 @@ def _tensions_at(equations: Balance, pose: int, least: float, most: float, rule:
     Unknown are the wrenches of the legs. Passive joints and the platform are in balance, which leaves some mixes of
     wrenches open; of these the rule chooses by the loads of the springs that only pull or push.
     """
-    matrix, right, loads_of_wrenches, weight = _balance_of_wrenches(equations, pose)
-    if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
+    conditions, right, loads_per_wrench, weight = _balance_of_wrenches(equations, pose)
+    if not (np.isfinite(conditions).all() and np.isfinite(right).all()):
         return None
-    start = np.linalg.lstsq(matrix, right, rcond=UNRESISTED)[0]
-    if np.abs(matrix @ start - right).max() > BALANCED * max(np.abs(right).max(), least):
+    least_wrenches = np.linalg.lstsq(conditions, right, rcond=UNRESISTED)[0]
+    if np.abs(conditions @ least_wrenches - right).max() > BALANCED * max(np.abs(right).max(), least):
         return None
-    _, sizes, rows = np.linalg.svd(matrix)
-    internal = rows[int((sizes > UNRESISTED * sizes[0]).sum()) :].T
-    base, change = loads_of_wrenches @ start - weight, loads_of_wrenches @ internal
+    _, sizes, rows = np.linalg.svd(conditions)
+    internal_wrenches = rows[int((sizes > UNRESISTED * sizes[0]).sum()) :].T
+    base, change = loads_per_wrench @ least_wrenches - weight, loads_per_wrench @ internal_wrenches
     sign = np.concatenate([leg.sign for leg in equations.mechanism.legs])
     bounded = sign != 0.0
     amounts = _internal_amounts(sign[bounded] * base[bounded], sign[bounded, None] * change[bounded], least, most, rule)
     return None if amounts is None else base + change @ amounts
 
 
-def _balance_of_wrenches(equations: Balance, pose: int) -> tuple[Array, Array, Array, Array]:
+class _WrenchBalance(NamedTuple):
     """The equations for the wrenches of all legs at one pose, and what the springs carry by them.
 
-    Returns:
-        Matrix and right side of the balance of platform and passive joints [conditions x wrenches], [conditions]; loads
-        of the springs per unit of each wrench, 0 of passive coordinates [coordinates x wrenches], and what weight takes
-        of these [coordinates].
+    Attributes:
+        conditions: matrix of the balance of platform and passive joints [conditions x wrenches].
+        right: right side of this balance [conditions].
+        loads_per_wrench: loads of the springs per unit of each wrench, 0 of passive coordinates [coordinates x
+            wrenches].
+        weight: the part of these loads that weight takes [coordinates].
     """
+
+    conditions: Array
+    right: Array
+    loads_per_wrench: Array
+    weight: Array
+
+
+def _balance_of_wrenches(equations: Balance, pose: int) -> _WrenchBalance:
+    """Write the balance of platform and passive joints at one pose; flexure hinges count as passive."""
     ways, legs = equations.mechanism.ways, equations.mechanism.legs
     size = ways.shape[1]
     conditions, right = [np.tile(np.eye(size), len(legs))], [ways.T @ equations.load[pose]]
@@ -172,7 +185,7 @@ def _balance_of_wrenches(equations: Balance, pose: int) -> tuple[Array, Array, A
         right.append(terms.residual[pose][passive])
         loads.append(np.where(passive[:, None], 0.0, rows))
         weight.append(np.where(passive, 0.0, terms.residual[pose]))
-    return np.concatenate(conditions), np.concatenate(right), np.concatenate(loads), np.concatenate(weight)
+    return _WrenchBalance(*(np.concatenate(parts) for parts in (conditions, right, loads, weight)))
 
 
 def _internal_amounts(base: Array, change: Array, least: float, most: float, rule: Rule) -> Array | None:

@@ -170,7 +170,7 @@ def _change(screws: Array, turning: Array, pulling: Array) -> Array:
     Args:
         screws: the screws of the motions [n x motions x 6].
         turning: brackets of the screws by the wrench [n x motions x 6].
-        pulling: second result of `_weight` [n x motions x 3].
+        pulling: the vectors of `_weight`, by which its gradient changes [n x motions x 3].
     """
     weighing = np.tril(np.einsum("njc,nkc->nkj", screws[..., :3], pulling))
     change = -weighing - np.swapaxes(np.tril(weighing, -1), 1, 2)
@@ -189,8 +189,8 @@ def _symmetric_change(screws: Array, turning: Array, pulling: Array) -> Array:
 def _weight(leg: ElasticLeg, placed: Sequence[Motions], screws: Array, gravity: Array) -> tuple[Array, Array]:
     """Gradient of the potential of a leg's weight by its motions [n x motions], and how it changes.
 
-    The gradient of motion k falls by the product of what is given for it [n x motions x 3] and the turn of a motion j
-    that is nearer to the base, and as much that of j by k.
+    The second result holds a vector for each motion k [n x motions x 3]. The product of this vector and the axis of a
+    motion j nearer to the base is the fall of k's gradient per unit of j, and of j's gradient per unit of k.
     """
     count, motions = screws.shape[:2]
     kind = np.result_type(screws, gravity, leg.masses.mass)

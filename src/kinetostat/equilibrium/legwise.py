@@ -87,6 +87,8 @@ class CondensedLeg:
     ) -> None:
         """Condense a leg: close it, take its passive motions out of its equations, and then its springs.
 
+        Each of these steps reads what those before it have set.
+
         Args:
             leg, mechanism: the leg, and the machine that it belongs to.
             row, wrench: its coordinates, and the wrench that the platform exerts on it [ways].

@@ -59,7 +59,7 @@ def _acceleration(at: Vector, body: BodyMotion, real_twist: Twist) -> Vector:
     return body.change.translational + body.change.rotational.cross(at) + body.twist.rotational.cross(speed)
 
 
-def _inertial(
+def _accelerating_wrenches(
     masses: Sequence[MassPoint],
     pairs: Sequence[tuple[int, int]],
     bodies: Sequence[BodyMotion],
@@ -92,7 +92,7 @@ def _inertial(
     return wrenches
 
 
-def _demand(
+def _demand_of(
     machine: RigidMachine,
     platform: Sequence[Wrench] = (),
     of_legs: Sequence[Sequence[Wrench]] | None = None,
@@ -132,15 +132,17 @@ def inertia(machine: RigidMachine, motion: MachineMotion, real_motion: MachineMo
     """Return the demand of masses and rotors along a motion, theory (90); arguments as of `rates.leg_motion`."""
     real_motion = real_motion or motion
     count, real_twist = len(machine.platform), real_motion.platform.twist
-    platform = _inertial(machine.platform, (), [motion.platform] * count, [real_twist] * count, machine.length)
+    platform = _accelerating_wrenches(
+        machine.platform, (), [motion.platform] * count, [real_twist] * count, machine.length
+    )
     of_legs, of_rotors = [], []
     for leg, leg_motion, real_leg_motion in zip(machine.legs, motion.legs, real_motion.legs, strict=True):
         bodies = [leg_motion.bodies[mass.carried] for mass in leg.masses]
         real_twists = [real_leg_motion.bodies[mass.carried].twist for mass in leg.masses]
-        of_legs.append(_inertial(leg.masses, leg.pairs, bodies, real_twists, machine.length))
+        of_legs.append(_accelerating_wrenches(leg.masses, leg.pairs, bodies, real_twists, machine.length))
         rotors = [machine.drives[n].inertia * leg_motion.change[k] for k, n in enumerate(leg.drives, leg.passive)]
         of_rotors.append([0.0] * leg.passive + rotors)
-    return _demand(machine, platform, of_legs, of_rotors)
+    return _demand_of(machine, platform, of_legs, of_rotors)
 
 
 def weight(machine: RigidMachine) -> ForceDemand:
@@ -150,23 +152,23 @@ def weight(machine: RigidMachine) -> ForceDemand:
         [force_on(mass.mass, mass.point, up) for mass in masses]
         for masses in (machine.platform, *(leg.masses for leg in machine.legs))
     )
-    return _demand(machine, platform, of_legs)
+    return _demand_of(machine, platform, of_legs)
 
 
 def process(machine: RigidMachine) -> ForceDemand:
     """Return the demand of the loads of the file on the platform."""
-    return _demand(machine, [NO_WRENCH - machine.process])
+    return _demand_of(machine, [NO_WRENCH - machine.process])
 
 
 def hinges(machine: RigidMachine) -> ForceDemand:
     """Return the demand of flexure hinges, which bend."""
-    return _demand(machine, of_coordinates=[[*leg.springs, *(0.0 for _ in leg.drives)] for leg in machine.legs])
+    return _demand_of(machine, of_coordinates=[[*leg.springs, *(0.0 for _ in leg.drives)] for leg in machine.legs])
 
 
 def friction(machine: RigidMachine, motion: MachineMotion) -> ForceDemand:
     """Return the demand of friction of joints and drives, theory (91); where nothing moves, Coulomb's is zero."""
     rows = [_leg_friction(machine, leg, moving) for leg, moving in zip(machine.legs, motion.legs, strict=True)]
-    return _demand(machine, of_coordinates=rows)
+    return _demand_of(machine, of_coordinates=rows)
 
 
 def _leg_friction(machine: RigidMachine, leg: RigidLeg, motion: LegMotion) -> Row:
@@ -235,14 +237,14 @@ def drive_statics(machine: RigidMachine) -> DriveStatics:
         for place, number in enumerate(leg.drives, leg.passive):
             by_twist[number] = leg.rates_by_twist[place]
     rates = [[inner_product(row, way) for way in ways] if machine.ways else row for row in by_twist]
-    weights = _weights(machine)
+    weights = _stiffness_roots(machine)
     weighted_rates = [[rate * share for rate in row] for row, share in zip(rates, weights, strict=True)]
     solution, _, _ = right_inverse([list(row) for row in zip(*weighted_rates, strict=True)])
     inverse = [[entry * share for entry in row] for row, share in zip(solution, weights, strict=True)]
     return DriveStatics(ways, tuple(inverse), tuple(rates))
 
 
-def _weights(machine: RigidMachine) -> list[Scalar]:
+def _stiffness_roots(machine: RigidMachine) -> list[Scalar]:
     """Return roots of the drives' stiffness, by which more drives than ways share a load; alike if a drive is rigid."""
     stiffnesses = [drive.spring.stiffness for drive in machine.drives]
     if not machine.plan.overactuated or any(map(is_infinite, stiffnesses)):
@@ -255,9 +257,9 @@ def along_ways(machine: RigidMachine, ways: Sequence[Row], demand: ForceDemand) 
     """Return generalised forces along some twists of the platform, with the legs following, theory (92)."""
     whole = list(demand.platform.components())
     for leg, row in zip(machine.legs, demand.legs, strict=True):
-        for solved, force in zip(leg.rates_by_twist, row, strict=True):
+        for rates, force in zip(leg.rates_by_twist, row, strict=True):
             if not is_zero(force):
-                whole = [a + b * force for a, b in zip(whole, solved, strict=True)]
+                whole = [a + b * force for a, b in zip(whole, rates, strict=True)]
     return [inner_product(way, whole) for way in ways]
 
 

@@ -99,12 +99,20 @@ class MachineAtPose:
             return machine_motion(self.rigid, platform_motion(self.rigid, placement), real_motion)
         return motion_along(self.rigid, self.coordinates, direction, real_motion)
 
-    def drive_rates(self, motion: MachineMotion, change: bool = False) -> Row:
-        """Return the rates of the drives in a motion, or their change, SI."""
+    def drive_rates(self, motion: MachineMotion) -> Row:
+        """Return the rates of the drives in a motion, SI."""
+        return self._numbers_of_drives([leg.rates for leg in motion.legs])
+
+    def drive_changes(self, motion: MachineMotion) -> Row:
+        """Return the change of the rates of the drives in a motion, SI."""
+        return self._numbers_of_drives([leg.change for leg in motion.legs])
+
+    def _numbers_of_drives(self, rows: Sequence[Row]) -> Row:
+        """Return those of the drives among numbers of all coordinates of each leg, in SI."""
         result: Row = [0.0] * len(self.rigid.drives)
-        for leg, leg_motion in zip(self.rigid.legs, motion.legs, strict=True):
+        for leg, row in zip(self.rigid.legs, rows, strict=True):
             for place, number in enumerate(leg.drives, leg.passive):
-                result[number] = (leg_motion.change if change else leg_motion.rates)[place]
+                result[number] = row[place]
         return [rate * unit for rate, unit in zip(result, self.rate_units, strict=True)]
 
     def unit_motions(
@@ -202,7 +210,7 @@ def operators(placed: MachineAtPose, rates: Mapping[str, Scalar]) -> Operators:
         coriolis=[[_work(demand, other) * length for demand in of_speed] for other in columns],
         gravity=[_work(of_weight, other) * length for other in columns],
         drive_rates=_transpose([placed.drive_rates(column) for column in columns]),
-        drive_changes=_transpose([placed.drive_rates(column, change=True) for column in columns]),
+        drive_changes=_transpose([placed.drive_changes(column) for column in columns]),
     )
 
 
@@ -215,15 +223,9 @@ def _mass(placed: MachineAtPose, columns: Sequence[MachineMotion]) -> list[Row]:
 def mass_at_drives(placed: MachineAtPose) -> list[Row]:
     """Return M over the coordinates of the drives, as many as of the pose, SI, theory (95)."""
     columns = placed.unit_motions()
-    rates = _transpose([placed.drive_rates(column) for column in columns])
-    zeros = [0.0] * len(rates)
-    return Operators(
-        mass=_mass(placed, columns),
-        coriolis=[zeros] * len(rates),
-        gravity=zeros,
-        drive_rates=rates,
-        drive_changes=[zeros] * len(rates),
-    ).at_drives()[0]
+    inverse, _ = dual_basis(_transpose([placed.drive_rates(column) for column in columns]))  # as in `at_drives`
+    momenta = _product_with_transpose(_mass(placed, columns), inverse)
+    return _product_with_transpose(inverse, _transpose(momenta))
 
 
 def loads_by_acceleration(placed: MachineAtPose) -> list[Twist]:
@@ -290,7 +292,7 @@ def drive_numbers(placed: MachineAtPose, direction: PoseRates) -> list[Scalar]:
     """Return the numbers `NUMBERS_OF_DRIVE` of all drives along a motion, one drive after the other, SI."""
     motion, demand_by_part = forces_along(placed, direction)
     drives, length = placed.rigid.drives, placed.rigid.length
-    rows = [placed.drive_rates(motion, change=change) for change in (False, True)]
+    rows = [placed.drive_rates(motion), placed.drive_changes(motion)]
     for part in PARTS:
         forces = drive_forces(placed.rigid, placed.statics, demand_by_part[part])
         rows.append([force * (1.0 if drive.slides else length) for force, drive in zip(forces, drives, strict=True)])
@@ -370,7 +372,7 @@ def tool_wrench(placed: MachineAtPose, direction: PoseRates) -> list[Scalar]:
             drive, rate = placed.rigid.drives[number], leg_motion.rates[place]
             friction = drive.coulomb * direction_of_motion(rate)
             row[place] = row[place] - drive.inertia * leg_motion.change[place] - drive.viscous * rate - friction
-        for solved, force in zip(leg.rates_by_twist, row, strict=True):
-            whole = [a - b * force for a, b in zip(whole, solved, strict=True)]
+        for rates, force in zip(leg.rates_by_twist, row, strict=True):
+            whole = [a - b * force for a, b in zip(whole, rates, strict=True)]
     length = placed.rigid.length
     return [*(part * length for part in whole[:3]), *whole[3:]]

@@ -9,6 +9,7 @@ Source: theory (85)-(89). Units are those of `rigid`.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from kinetostat.algebra.jet import Jet
 from kinetostat.algebra.scalar import Scalar, inner_product, sqrt, total
@@ -138,14 +139,14 @@ def leg_motion(leg: RigidLeg, platform: BodyMotion, real_motion: LegMotion | Non
         platform: the motion of the platform.
         real_motion: how the leg really moves, if that is not this motion itself.
     """
-    rates = [_product(row, platform.twist) for row in leg.rates_by_twist]
+    rates = [_rate_by(row, platform.twist) for row in leg.rates_by_twist]
     twists = _sums_along(leg, leg.screws, rates)
     real_twists = twists if real_motion is None else [body.twist for body in real_motion.bodies]
     carried_screws = zip(real_twists, leg.screws, leg.coordinates, strict=False)  # one twist more, that of the end
     screw_rates = [bracket(twist, screw) if place >= 0 else NO_MOTION for twist, screw, place in carried_screws]
     drifts = _sums_along(leg, screw_rates, rates)
     to_follow = platform.change - drifts[-1]
-    change = [_product(row, to_follow) for row in leg.rates_by_twist]
+    change = [_rate_by(row, to_follow) for row in leg.rates_by_twist]
     changes = [part + drift for part, drift in zip(_sums_along(leg, leg.screws, change), drifts, strict=True)]
     bodies = tuple(BodyMotion(*both) for both in zip(twists, changes, strict=True))
     return LegMotion(rates, change, bodies, drifts[-1])
@@ -159,7 +160,8 @@ def _sums_along(leg: RigidLeg, screws: Sequence[Twist], rates: Row) -> list[Twis
     return sums
 
 
-def _product(row: Sequence[Scalar], twist: Twist) -> Scalar:
+def _rate_by(row: Sequence[Scalar], twist: Twist) -> Scalar:
+    """Return the rate of a coordinate by a twist, from the row that says so."""
     return inner_product(row, twist.components())
 
 
@@ -202,7 +204,7 @@ def coordinates_of(
         placement: placement of the platform.
         angles: yaw and pitch of the platform.
     """
-    (yaw_cos, yaw_sin), (pitch_cos, pitch_sin) = angles
+    yaw_cos, yaw_sin, pitch_cos, pitch_sin = angles
     shrink = 1.0 / pitch_cos
     axes = (Vector(yaw_cos * pitch_cos, yaw_sin * pitch_cos, -pitch_sin), Vector(-yaw_sin, yaw_cos, 0.0), Z_AXIS)
     rows = (
@@ -220,15 +222,20 @@ def coordinates_of(
     return Coordinates(tuple(names), arm, axes, rows, tuple(unit_twists))
 
 
-Angles = tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar]]
-"""Cosine and sine of yaw and of pitch."""
+class Angles(NamedTuple):
+    """Cosines and sines of yaw and pitch of Q = Rz(yaw) Ry(pitch) Rx(roll)."""
+
+    yaw_cos: Scalar
+    yaw_sin: Scalar
+    pitch_cos: Scalar
+    pitch_sin: Scalar
 
 
 def angles_of(placement: Displacement) -> Angles:
-    """Return cosine and sine of yaw and pitch of Q = Rz(yaw) Ry(pitch) Rx(roll)."""
+    """Return yaw and pitch of a placement, whose pitch must not be a right angle."""
     x_axis = placement.rotation.x
     pitch_cos = sqrt(x_axis.x * x_axis.x + x_axis.y * x_axis.y)
-    return (x_axis.x / pitch_cos, x_axis.y / pitch_cos), (pitch_cos, -x_axis.z)
+    return Angles(x_axis.x / pitch_cos, x_axis.y / pitch_cos, pitch_cos, -x_axis.z)
 
 
 def _coordinate_rate(name: str, arm: Vector, rows: Sequence[Vector], twist: Twist) -> Scalar:
@@ -247,7 +254,9 @@ def motion_along(
     the change of the coordinates.
     """
     units = {name: (1.0 / machine.length if name in POINT else 1.0) for name in coordinates.names}
-    twist = _sum(coordinates.unit_twists, [direction.rates[name] * units[name] for name in coordinates.names])
+    twist = _combined_twist(
+        coordinates.unit_twists, [direction.rates[name] * units[name] for name in coordinates.names]
+    )
     forced = _forced_change(machine, machine_motion(machine, BodyMotion(twist, NO_MOTION), real_motion))
     real_twist = twist if real_motion is None else real_motion.platform.twist
     speed = real_twist.translational + real_twist.rotational.cross(coordinates.arm)
@@ -260,7 +269,9 @@ def motion_along(
         else:
             change = change + coordinates.rates_of_turns[ANGLES.index(name)].dot(axis_turning)
         remaining.append(change - _coordinate_rate(name, coordinates.arm, coordinates.rates_of_turns, forced))
-    return machine_motion(machine, BodyMotion(twist, forced + _sum(coordinates.unit_twists, remaining)), real_motion)
+    return machine_motion(
+        machine, BodyMotion(twist, forced + _combined_twist(coordinates.unit_twists, remaining)), real_motion
+    )
 
 
 def _forced_change(machine: RigidMachine, motion: MachineMotion) -> Twist:
@@ -276,7 +287,7 @@ def _forced_change(machine: RigidMachine, motion: MachineMotion) -> Twist:
     independent = [drifts[number] for number in machine.plan.independent]
     if not independent:
         return NO_MOTION
-    return _sum([list(row) for row in zip(*machine.constraint_twists, strict=True)], independent)
+    return _combined_twist([list(row) for row in zip(*machine.constraint_twists, strict=True)], independent)
 
 
 def _axis_turning(coordinates: Coordinates, twist: Twist, real_twist: Twist) -> Vector:
@@ -288,7 +299,7 @@ def _axis_turning(coordinates: Coordinates, twist: Twist, real_twist: Twist) -> 
     return turning.cross(roll_axis) * roll + (yaw_axis * real_yaw).cross(pitch_axis) * pitch
 
 
-def _sum(rows: Sequence[Sequence[Scalar]], factors: Sequence[Scalar]) -> Twist:
+def _combined_twist(rows: Sequence[Sequence[Scalar]], factors: Sequence[Scalar]) -> Twist:
     """Return the sum of rows of six, each times its factor, as a twist."""
     parts = [total([row[i] * factor for row, factor in zip(rows, factors, strict=True)]) for i in range(6)]
     return Twist.of(parts)

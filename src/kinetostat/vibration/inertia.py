@@ -42,10 +42,17 @@ class PartRates:
 def tensor_of(masses: Masses, number: int, motion: Motions) -> Array | None:
     """Return the inertia of a mass about its point, displaced from the free state [n x 3 x 3]; None if it has none."""
     entries = masses.inertia[:, number]
-    if all(map(is_zero, entries.flat)) if entries.dtype == object else not entries.any():  # of traced ones by form
+    if _are_zero(entries):
         return None
     rows = np.stack([entries[:, list(row)] for row in TENSOR_ROWS], axis=1)
     return np.asarray(motion.rotation @ rows @ np.swapaxes(motion.rotation, 1, 2))
+
+
+def _are_zero(entries: Array) -> bool:
+    """Tell whether all entries are zero: numbers by their value, scalars of other kinds by their form."""
+    if entries.dtype == object:
+        return all(map(is_zero, entries.flat))
+    return not entries.any()
 
 
 def leg_rates(leg: ElasticLeg, placed: PlacedChain) -> list[PartRates]:

@@ -178,24 +178,29 @@ class ClosedLoops:
         ports = np.array([drive.motion for drive in self.modes.drives])
         machine = state_space(self.modes, self.damping, ports, ports)
         count, size = len(self.loops), len(machine.states)
-        k, inertia, friction, gain, position_gain, at_load = (
-            np.array([getattr(loop, name) for loop in self.loops])[:, None]
-            for name in ("transmission", "inertia", "friction", "velocity_gain", "position_gain", "at_load")
+        # Columns of numbers, one for each drive.
+        transmission = np.array([[loop.transmission] for loop in self.loops])
+        inertia = np.array([[loop.inertia] for loop in self.loops])
+        friction = np.array([[loop.friction] for loop in self.loops])
+        gain = np.array([[loop.velocity_gain] for loop in self.loops])
+        position_gain = np.array([[loop.position_gain] for loop in self.loops])
+        at_load = np.array([[loop.at_load] for loop in self.loops])
+        integral_gain = np.array(
+            [[loop.velocity_gain / loop.integral_time if loop.integral_time else 0.0] for loop in self.loops]
         )
-        times = [loop.integral_time for loop in self.loops]
-        integral_gain = np.array([[row[0] / t if t else 0.0] for row, t in zip(gain, times, strict=True)])
         zero = np.zeros((count, count))
         # Rows by the states (machine, motors, speeds, integrals): a motor at x_m pulls its joint with k x_m.
-        joint = np.hstack([machine.c, machine.d * k.T, zero, zero])
+        joint = np.hstack([machine.c, machine.d * transmission.T, zero, zero])
         motor, speed, integral = (
             np.hstack([np.zeros((count, size)), *(np.eye(count) if i == place else zero for i in range(3))])
             for place in range(STATES_OF_DRIVE)
         )
         measured_position = at_load * joint + (1.0 - at_load) * motor
-        torque = k * (joint - motor) - friction * speed
+        torque = transmission * (joint - motor) - friction * speed
         torque = torque - gain * (position_gain * measured_position + speed)
         torque = torque - integral_gain * (position_gain * integral + motor)
-        rows = [np.hstack([machine.a, machine.b * k.T, np.zeros((size, 2 * count))]), speed, torque / inertia]
+        of_machine = np.hstack([machine.a, machine.b * transmission.T, np.zeros((size, 2 * count))])
+        rows = [of_machine, speed, torque / inertia]
         # A loop without an integral part has an integral state that decays at 1/s and that nothing reads.
         rows.append(np.where(integral_gain > 0.0, measured_position, -integral))
         return np.asarray(np.linalg.eigvals(np.vstack(rows)))
