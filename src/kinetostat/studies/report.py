@@ -4,7 +4,7 @@ Each question has a condition: the error budget, for instance, is asked if the f
 that has no answer says why.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import GROUPS
 from kinetostat.machine.loading import bundled, load
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import find
+from kinetostat.machine.parameters import POSE, find
 from kinetostat.machine.saving import as_file
 from kinetostat.spec import document as documents
 from kinetostat.spec.errors import InputError, choice
@@ -53,7 +53,9 @@ REPORT_PARTS = ("maps", "guidelines", "sensitivity", "validation")
 NOTHING_TO_MAP = "No coordinate of the pose can change by itself here, so that there is nothing to map."
 """The text in the place of maps where there is none."""
 
-Texts = tuple[tuple[str, str], ...]
+InputText = tuple[str, str]
+"""Name and text of a file."""
+Texts = tuple[InputText, ...]
 """Name and text of each file."""
 
 
@@ -87,14 +89,14 @@ def subject_of(name: str, settings: Sequence[str] = ()) -> Subject:
     path = Path(name)
     shipped = name in bundled() or name in bundled_studies()
     if not shipped and documents.exists(path) and holds_study(path):
-        return _study_in_folder(path, settings)
+        return _subject_in_folder(path, settings)
     if is_study(name):
-        return _study(name, path, settings)
+        return _subject_of_study(name, path, settings)
     machine = load(name, settings)
-    return Subject(machine, (_read(name, path),))
+    return Subject(machine, (_machine_text(name, path),))
 
 
-def _study_in_folder(folder: Path, settings: Sequence[str]) -> Subject:
+def _subject_in_folder(folder: Path, settings: Sequence[str]) -> Subject:
     if settings:
         raise InputError(f'"{folder}" holds a study with settings of its own; leave out --set.')
     problem = stored_problem(folder)
@@ -106,16 +108,20 @@ def texts_of(problem: Problem) -> Texts:
     return ("study.toml", study_toml(problem.study)), ("machine.toml", as_file(problem.machine))
 
 
-def _study(name: str, path: Path, settings: Sequence[str]) -> Subject:
+def _subject_of_study(name: str, path: Path, settings: Sequence[str]) -> Subject:
+    """A study by its name or path; a machine that is not bundled lies beside its file."""
     problem = load_problem(name, settings)
     machine = problem.study.machine
-    study = (f"{name}.toml", bundled_studies()[name]) if name in bundled_studies() else _read(name, path)
-    return Subject(problem.machine, (study, _read(machine, path.parent / machine)), problem)
+    machine_text = _machine_text(machine, path.parent / machine)
+    return Subject(problem.machine, (_text_of(name, path, bundled_studies()), machine_text), problem)
 
 
-def _read(name: str, path: Path) -> tuple[str, str]:
-    """The text of a machine or study file, or of a bundled machine of that name."""
-    shipped = bundled()
+def _machine_text(name: str, path: Path) -> InputText:
+    return _text_of(name, path, bundled())
+
+
+def _text_of(name: str, path: Path, shipped: Mapping[str, str]) -> InputText:
+    """The text that is shipped under a name, or else that of a file."""
     return (f"{name}.toml", shipped[name]) if name in shipped else (path.name, path.read_text("utf-8-sig"))
 
 
@@ -158,7 +164,7 @@ class ReportQuestion:
         name: name of the question and of its answer.
         ask: answers the question, from the answers so far.
         when: whether the question is asked.
-        part: the part of `REPORT_PARTS` to which it belongs; empty if it is always asked.
+        part: the part of `REPORT_PARTS` to which it belongs; empty if it cannot be left out.
         section: whether the report has a section that is made of its answer alone.
     """
 
@@ -202,9 +208,7 @@ REPORT_QUESTIONS = (
         lambda known: any(each.fits for each in known.machine.requirements.values()),
         section=True,
     ),
-    ReportQuestion(
-        "lobes", lambda known: lobes(known.state), lambda known: _says_what_it_cuts(known.machine), section=True
-    ),
+    ReportQuestion("lobes", lambda known: lobes(known.state), lambda known: _has_cut(known.machine), section=True),
     ReportQuestion(
         "budget", lambda known: budget(known.state), lambda known: bool(known.machine.tolerances), section=True
     ),
@@ -212,16 +216,16 @@ REPORT_QUESTIONS = (
         "maps",
         lambda known: evaluate_grid(known.state, known.ranges, _compliances(known.machine)),
         lambda known: bool(known.ranges),
-        "maps",
+        part="maps",
     ),
     ReportQuestion(
         "frequencies",
         lambda known: evaluate_grid(known.state, known.ranges, [_first_frequency(known.machine)]),
         lambda known: bool(known.ranges and known.of("vibration") and known.of("vibration").modes),
-        "maps",
+        part="maps",
     ),
     ReportQuestion("sensitivity", lambda known: sensitivity(known.state), part="sensitivity"),
-    ReportQuestion("guidelines", lambda known: _advice(known.state, known.ranges), part="guidelines"),
+    ReportQuestion("guidelines", lambda known: _guidelines_over(known.state, known.ranges), part="guidelines"),
 )
 """The questions in the order in which they are asked and shown, each with its condition. Later ones may read earlier
 answers: the map of frequencies is drawn only if vibrations have modes."""
@@ -239,7 +243,7 @@ def gather(
     motion: str | Path | None = None,
     elevations: str = "",
 ) -> Answers:
-    """Answer every question of a report on a machine.
+    """Answer every question of a report on a machine; only the analysis where its pose has no answer.
 
     Args:
         machine: the machine with its pose.
@@ -285,7 +289,7 @@ def gather(
     return known
 
 
-def _says_what_it_cuts(machine: Machine) -> bool:
+def _has_cut(machine: Machine) -> bool:
     """Whether the file gives masses, and a table [cutting] that is complete enough for stability lobes."""
     cutting = machine.tables["cutting"]
     return _has_mass(machine) and bool(cutting.pressure and any(cutting.direction))
@@ -300,12 +304,11 @@ def _first_frequency(machine: Machine) -> str:
     return "loaded_frequency_1" if machine.loaded else "frequency_1"
 
 
-def _advice(state: MachineState, over: Sequence[str]) -> Guidelines:
+def _guidelines_over(state: MachineState, ranges: Sequence[str]) -> Guidelines:
     """Guidelines, over a grid of those ranges that are coordinates of the pose."""
-    fields = {text: find(state.machine.family, parse_range(text).field).path for text in over}
-    return guidelines(
-        state, coarser_ranges([text for text in over if fields[text].startswith("pose.")], GUIDELINE_POINTS)
-    )
+    paths = {text: find(state.machine.family, parse_range(text).field).path for text in ranges}
+    of_pose = [text for text, path in paths.items() if path.startswith(POSE)]
+    return guidelines(state, coarser_ranges(of_pose, GUIDELINE_POINTS))
 
 
 def _compliances(machine: Machine) -> list[str]:

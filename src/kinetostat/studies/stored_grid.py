@@ -5,12 +5,12 @@ Resuming computes the chunks that are missing or damaged. The format of the file
 """
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -135,11 +135,10 @@ def answer_into(
         if partial_of(final).exists():
             partial_of(final).replace(final)
         records = study.records()
-        summary = tally_of([records[number] for number in range(work.count)], question.names)
         return StoredGrid(
             question=question,
             path=final,
-            tally=summary,
+            tally=_tally_of([records[number] for number in range(work.count)], question.names),
             chunks=work.count,
             computed=len(missing),
             repaired=repaired,
@@ -170,11 +169,11 @@ def partial_of(final: Path) -> Path:
 def _begin_or_continue(question: GridQuestion, study: StudyFolder, final: Path) -> tuple[Work, Layout | None]:
     """Begin the study, or take its work from the folder; the layout is None in a folder from before layouts."""
     work = in_chunks(question.machine, question.grid, question.names)
-    question_now = _as_record(question, final.name)
-    stored = study.checked_question(question_now, _in_this_version)
+    record = _question_record(question, final.name)
+    stored = study.checked_question(record, _in_this_version)
     if stored is None:
         layout = _create(question, final)
-        study.begin({**question_now, "chunk": work.chunk, LAYOUT: layout})
+        study.begin({**record, "chunk": work.chunk, LAYOUT: layout})
         return work, layout
     if not final.exists() and not partial_of(final).exists():
         raise InputError(f'"{final}" was removed from its study; remove the folder "{study.path}" to begin again.')
@@ -182,6 +181,7 @@ def _begin_or_continue(question: GridQuestion, study: StudyFolder, final: Path) 
 
 
 def _create(question: GridQuestion, final: Path) -> Layout:
+    """Make the file of a grid in which nothing is computed yet, at the path of a partial result."""
     quantities = {name: about_quantity(name) for name in question.names}
     return create(partial_of(final), question.labels, question.dims, quantities, _about_status())
 
@@ -191,13 +191,12 @@ def _repair(question: GridQuestion, study: StudyFolder, final: Path, work: Work,
 
     A file whose structure is damaged is made again, and the numbers of its sound chunks are copied.
     """
-    path = final if final.exists() else partial_of(final)
+    path, broken = final if final.exists() else partial_of(final), final.with_suffix(f".damaged{final.suffix}")
     records = study.records()
-    lost = study.damaged
+    lost_notes = study.damaged
     damaged = damaged_chunks(path, layout, records, work.chunk)
     frame_is_sound = frame_is_whole(path, layout)
     if not frame_is_sound:
-        broken = final.with_suffix(f".damaged{final.suffix}")
         path.replace(broken)
         fresh = _create(question, final)  # of an earlier version's file, another layout
         with writing(path), broken.open("rb") as source, partial_of(final).open("r+b") as target:
@@ -205,13 +204,14 @@ def _repair(question: GridQuestion, study: StudyFolder, final: Path, work: Work,
                 copy_run(source, layout, target, fresh, work.part(number))
             settle(target)
         study.write_question(read_question(study.path) | {LAYOUT: fresh})
-    final.with_suffix(f".damaged{final.suffix}").unlink(missing_ok=True)
-    if damaged or lost:
+    broken.unlink(missing_ok=True)
+    repaired = []
+    if damaged or lost_notes:
         study.keep(record for number, record in records.items() if number not in damaged)
-    chunks = len(damaged) + lost
-    return " and ".join(
-        [f"{chunks:,} of {work.count:,} chunks"] * bool(chunks) + ["the structure of its file"] * (not frame_is_sound)
-    )
+        repaired.append(f"{len(damaged) + lost_notes:,} of {work.count:,} chunks")
+    if not frame_is_sound:
+        repaired.append("the structure of its file")
+    return " and ".join(repaired)
 
 
 def damaged_chunks(path: Path, layout: Layout, records: Mapping[int, Record], chunk: int) -> set[int]:
@@ -237,7 +237,7 @@ def _about_status() -> Mapping[str, Any]:
     return {"flag_values": [UNKNOWN, *(int(status) for status in Status)], "flag_meanings": meanings}
 
 
-def _as_record(question: GridQuestion, file: str) -> Record:
+def _question_record(question: GridQuestion, file: str) -> Record:
     """Everything on which the numbers depend: a folder with another record holds another study."""
     attributes = question.labels.attrs
     axes = [
@@ -289,36 +289,48 @@ def _compute_missing(
 def _write_chunk(file: ResultFile, study: StudyFolder, number: int, start: int, evaluation: Evaluation) -> None:
     """Write the numbers first, and then the note that they are there."""
     written = file.write(start, evaluation.values, evaluation.status)
-    study.note({"chunk": number, **tally(evaluation), DATA: written})
+    study.note({"chunk": number, **_chunk_tally(evaluation), DATA: written})
 
 
-def tally(evaluation: Evaluation) -> dict[str, Any]:
-    """Return the counts and extremes of one chunk, as plain data."""
+class _QuantityTally(TypedDict):
+    """Counts and extremes of a quantity over a chunk, as its note has them: NaN where the quantity has no value."""
+
+    count: int
+    least: float
+    sum: float
+    largest: float
+
+
+class _ChunkTally(TypedDict):
+    """What the note about a chunk says of its numbers: points by the word of their status, and each quantity."""
+
+    status: dict[str, int]
+    quantities: dict[str, _QuantityTally]
+
+
+def _chunk_tally(evaluation: Evaluation) -> _ChunkTally:
     codes, counts = np.unique(evaluation.status, return_counts=True)
     quantities = {}
     for name, values in evaluation.values.items():
         numbers = values[~np.isnan(values)]
         least, largest = (float(numbers.min()), float(numbers.max())) if len(numbers) else (np.nan, np.nan)
-        quantities[name] = {"count": len(numbers), "least": least, "sum": float(numbers.sum()), "largest": largest}
-    return {
-        "status": {Status(int(code)).word: int(n) for code, n in zip(codes, counts, strict=True)},
-        "quantities": quantities,
-    }
+        quantities[name] = _QuantityTally(count=len(numbers), least=least, sum=float(numbers.sum()), largest=largest)
+    statuses = {Status(int(code)).word: int(count) for code, count in zip(codes, counts, strict=True)}
+    return _ChunkTally(status=statuses, quantities=quantities)
 
 
-def tally_of(parts: Iterable[Mapping[str, Any]], names: Sequence[str]) -> Tally:
-    """Combine counts and extremes of several chunks."""
-    chunks = list(parts)
+def _tally_of(records: Sequence[Record], names: Sequence[str]) -> Tally:
+    """Combine what the notes about all chunks say."""
     words: Counter[str] = Counter()
-    for part in chunks:
-        words.update(part["status"])
+    for record in records:
+        words.update(record["status"])
     statuses = {status: words[status.word] for status in Status if words[status.word]}
-    return Tally(statuses, {name: _extremes([part["quantities"][name] for part in chunks]) for name in names})
+    return Tally(statuses, {name: _extremes([record["quantities"][name] for record in records]) for name in names})
 
 
-def _extremes(parts: Sequence[Mapping[str, float]]) -> Extremes:
-    filled = [part for part in parts if part["count"]]
+def _extremes(chunks: Sequence[_QuantityTally]) -> Extremes:
+    filled = [chunk for chunk in chunks if chunk["count"]]
     if not filled:
         return Extremes(np.nan, np.nan, np.nan)
-    mean = sum(part["sum"] for part in filled) / sum(part["count"] for part in filled)
-    return Extremes(min(part["least"] for part in filled), mean, max(part["largest"] for part in filled))
+    mean = sum(chunk["sum"] for chunk in filled) / sum(chunk["count"] for chunk in filled)
+    return Extremes(min(chunk["least"] for chunk in filled), mean, max(chunk["largest"] for chunk in filled))

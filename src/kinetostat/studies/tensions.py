@@ -132,30 +132,31 @@ def tensions(machine: Machine | MachineState, wrenches: Any = None) -> Tensions:
         required = None if wrenches is None else _required_loads(machine, wrenches)
         capacity = float(cables.capacity(required)[0])
         closure = float(wrench_closure(cables.wrenches)[0])
-    exist = bool(cables.tensions[1][0])
+    tensions_exist = bool(cables.tensions[1][0])
     states = _cable_states(machine, cables)
-    show = machine.display.show
-    if exist:
-        sizes = [cable.tension for cable in states if cable.tension is not None]
-        ends = f"{show(min(sizes), 'N')} to {show(max(sizes), 'N')}"
-        message = f"Tensions from {ends} hold the load."
-    elif not cables.settled[0]:
-        message = (
-            f"No shape was found in which the cables of {machine.name} hang and hold this load: tensions and shapes, "
-            "which follow from each other, do not settle. Raise load.min_tension, or make the cables lighter."
-        )
-    else:
-        message = why_no_tensions(machine)
     return Tensions(
         machine=machine,
-        status=Status.OK if exist else Status.NO_REST,
-        message=message,
+        status=Status.OK if tensions_exist else Status.NO_REST,
+        message=_message(machine, states, tensions_exist, shapes_settle=bool(cables.settled[0])),
         cables=states,
         bounds=(float(cables.least[0]), float(cables.most[0])),
         capacity=capacity,
         wrench_closure=closure,
         required=1 if required is None else len(required),
     )
+
+
+def _message(machine: Machine, states: Sequence[CableState], tensions_exist: bool, shapes_settle: bool) -> str:
+    """The answer in a sentence: the range of the tensions, or the reason why there are none."""
+    if tensions_exist:
+        show, sizes = machine.display.show, [cable.tension for cable in states if cable.tension is not None]
+        return f"Tensions from {show(min(sizes), 'N')} to {show(max(sizes), 'N')} hold the load."
+    if not shapes_settle:
+        return (
+            f"No shape was found in which the cables of {machine.name} hang and hold this load: tensions and shapes, "
+            "which follow from each other, do not settle. Raise load.min_tension, or make the cables lighter."
+        )
+    return why_no_tensions(machine)
 
 
 def _required_loads(machine: Machine, wrenches: Any) -> Array:
@@ -249,21 +250,22 @@ def carrying_legs(
             f'all legs of {machine.name} pull and push, so that all of them carry; write acts = "pulls" at an '
             'actuator, or a leg of type = "cable".'
         )
-    names, size, slab = [leg.name for leg in state.configuration.legs], question.grid.size, loaded.Way.ANY_MACHINE.slab
+    names, size = [leg.name for leg in state.configuration.legs], question.grid.size
+    points_at_once = loaded.Way.ANY_MACHINE.slab
     carries, status = np.zeros((size, len(names)), dtype=bool), np.zeros(size, dtype=np.int8)
-    for start in range(0, size, slab):
-        part = slice(start, min(start + slab, size))
-        columns = question.grid.columns(part.start, part.stop)
-        carries[part], status[part] = _carrying_in_slab(machine, columns, part.stop - start, len(names))
+    for start in range(0, size, points_at_once):
+        slab = slice(start, min(start + points_at_once, size))
+        columns = question.grid.columns(slab.start, slab.stop)
+        carries[slab], status[slab] = _carrying_in_slab(machine, columns, slab.stop - start, len(names))
         if progress is not None:
-            progress(part.stop, size)
+            progress(slab.stop, size)
     codes, rows, counts = _numbered_sets(carries, status == Status.OK)
     sets = tuple(tuple(name for name, carried in zip(names, row, strict=True) if carried) for row in rows)
     words = ["+".join("_".join(name.split()) for name in members) or "none" for members in sets]
-    about = {"units": "1", "flag_values": list(range(len(sets))), "flag_meanings": " ".join(words)}
+    about_sets = {"units": "1", "flag_values": list(range(len(sets))), "flag_meanings": " ".join(words)}
     shape = question.grid.shape
     dataset = question.labels.assign(
-        carrying=(question.dims, codes.reshape(shape), about),
+        carrying=(question.dims, codes.reshape(shape), about_sets),
         status=(question.dims, status.reshape(shape), datasets.ABOUT_STATUS),
     )
     return Carrying(machine=machine, dataset=dataset, legs=tuple(names), sets=sets, points=counts)
