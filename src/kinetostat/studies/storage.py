@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 PREFIX = ".kinetostat-"
 """Beginning of the names of temporary folders."""
-ABANDONED = 24 * 3600.0
+ABANDONED_AFTER = 24 * 3600.0
 """Age, s, after which a temporary folder counts as abandoned on systems without locks on folders: no file takes
 a day to write."""
 UNLOCKED = -1
@@ -106,7 +106,7 @@ def replacing(path: Path) -> Iterator[Path]:
         InputError: `path` may not be replaced (see `place_of`), or the disk is full or may not be written.
     """
     place = place_of(path)
-    with _folders(place.parent, path), writing(path), scratch(place.parent) as folder:
+    with _made_folders(place.parent, path), writing(path), scratch(place.parent) as folder:
         temporary = folder / place.name
         yield temporary
         temporary.chmod(stat.S_IMODE(place.stat().st_mode) if place.exists() else 0o644)
@@ -185,8 +185,16 @@ def _digest_of_file(path: Path) -> str:
 
 
 @contextmanager
-def _folders(folder: Path, path: Path) -> Iterator[None]:
-    """Make a folder and the missing folders above it; if the block fails, remove those that were made."""
+def _made_folders(folder: Path, path: Path) -> Iterator[None]:
+    """Make a folder and the missing folders above it; if the block fails, remove those that were made.
+
+    Args:
+        folder: the folder.
+        path: the path that messages name.
+
+    Raises:
+        InputError: a folder cannot be made.
+    """
     with writing(path):
         missing = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
@@ -219,10 +227,11 @@ def scratch(parent: Path) -> Iterator[Path]:
 
 
 def _remove_abandoned(folder: Path) -> None:
+    """Remove a temporary folder if nobody has its lock; without locks, if it is older than `ABANDONED_AFTER`."""
     handle = _lock_folder(folder)
     if handle == UNLOCKED:
         with suppress(OSError):
-            if time.time() - folder.stat().st_mtime > ABANDONED:
+            if time.time() - folder.stat().st_mtime > ABANDONED_AFTER:
                 shutil.rmtree(folder, ignore_errors=True)
     elif handle is not None:
         shutil.rmtree(folder, ignore_errors=True)

@@ -233,41 +233,45 @@ def load_curve(machine: Machine | MachineState, shares: Sequence[float] = CURVE_
     """
     start = state_of(machine)
     mechanism = start.mechanism
-    parts, last = list(start.machine.family.components), free_state(mechanism)
+    places, last = list(start.machine.family.components), free_state(mechanism)
     displacements, loads = [], []
     for share in shares:
         solution = at_rest(with_share(mechanism, share, preload=1.0), last)
-        states, rest_state = _spring_states(solution.balance), solution.balance.state
-        one_or_nan, last = (1.0, rest_state) if solution.settled[0] else (math.nan, last)
-        displacements.append(one_or_nan * _in_si(mechanism, rest_state.platform.amounts()[0], parts))
-        loads.append([one_or_nan * spring.load for spring in states])
-    return LoadCurve(np.array(shares), np.array(displacements), tuple(s.name for s in states), np.array(loads))
+        springs_at_rest, state_at_rest = _spring_states(solution.balance), solution.balance.state
+        comes_to_rest = bool(solution.settled[0])
+        one_or_nan = 1.0 if comes_to_rest else math.nan
+        displacements.append(one_or_nan * _in_si(mechanism, state_at_rest.platform.amounts()[0], places))
+        loads.append([one_or_nan * spring.load for spring in springs_at_rest])
+        last = state_at_rest if comes_to_rest else last
+    names = tuple(spring.name for spring in springs_at_rest)
+    return LoadCurve(np.array(shares), np.array(displacements), names, np.array(loads))
 
 
 def _answer_at_rest(state: MachineState, equations: Balance, stability: Stability) -> LoadedState:
     """Return the answer for a machine that comes to rest, whether its rest is stable or not."""
     machine, response = state.machine, state.free
-    mechanism, parts = equations.mechanism, list(machine.family.components)
-    units, square = mechanism.twist_units[0], np.ix_(parts, parts)
+    mechanism, places = equations.mechanism, list(machine.family.components)  # places in rx ry rz x y z
+    units, square = mechanism.twist_units[0], np.ix_(places, places)
     all_compliances = platform_compliance(equations)
     compliances = (all_compliances * mechanism.compliance_units)[0][square]
     springs_alone = (elastic_stiffness(equations, all_compliances) / mechanism.compliance_units)[0][square]
-    checks = _limits_at_rest(state)
-    stays = stability.stable and not any(strut.bends_away for strut in state.struts)
+    rest = Rest.OK if within(_limits_at_rest(state)) else Rest.JOINT_LIMIT
+    if not stability.stable or any(strut.bends_away for strut in state.struts):
+        rest = Rest.UNSTABLE
     return LoadedState(
         state=state,
-        rest=Rest.UNSTABLE if not stays else Rest.OK if within(checks) else Rest.JOINT_LIMIT,
+        rest=rest,
         reason="",
         components=machine.family.component_names,
-        displacement=_in_si(mechanism, equations.state.platform.amounts()[0], parts),
-        linear=_linear(response, mechanism, parts),
+        displacement=_in_si(mechanism, equations.state.platform.amounts()[0], places),
+        linear=_linear(response, mechanism, places),
         springs=tuple(_spring_states(equations)),
         slack_legs=_slack_legs(equations),
         elastic=_clean_stiffness(springs_alone),
         tangent=_clean_stiffness(stiffness_of(compliances[None])[0]),
         compliance=np.array(clean_matrix(compliances.tolist())),
         factor=None if math.isnan(stability.factor) else stability.factor,
-        mode=(stability.mode * units)[parts],
+        mode=(stability.mode * units)[places],
         mode_legs=tuple(moving_legs(equations, stability)) if math.isfinite(stability.factor) else (),
         struts=state.struts,
         residual=float(np.abs(equations.residual).max() / _largest_wrench(equations)),
@@ -323,20 +327,20 @@ def _spring_states(equations: Balance) -> list[SpringState]:
     return states
 
 
-def _linear(response: Response, mechanism: Mechanism, parts: list[int]) -> Array | None:
-    """The displacement to first order: one step of Newton's method from the free state."""
-    rows = np.array(response.compliance.rows(), dtype=float)
-    if int(response.status) not in REGULAR or not np.isfinite(rows).all():
+def _linear(response: Response, mechanism: Mechanism, places: list[int]) -> Array | None:
+    """The displacement to first order: one step of Newton's method from the free state; None where C is not finite."""
+    entries = np.array(response.compliance.rows(), dtype=float)
+    if int(response.status) not in REGULAR or not np.isfinite(entries).all():
         return None
     step = newton_step(balance(mechanism, free_state(mechanism)), loaded=False)[0]
-    return _in_si(mechanism, mechanism.ways @ step[mechanism.unknown_places.platform], parts)
+    return _in_si(mechanism, mechanism.ways @ step[mechanism.unknown_places.platform], places)
 
 
-def _in_si(mechanism: Mechanism, twist: Array, parts: list[int]) -> Array:
-    """Components of a displacement in rad and m; round-off is set to zero."""
+def _in_si(mechanism: Mechanism, twist: Array, places: list[int]) -> Array:
+    """Components of a displacement in rad and m, those at some places in rx ry rz x y z; round-off is set to zero."""
     numbers = np.where(np.abs(twist) < UNMOVED_TOOL, 0.0, twist).tolist()
     cleaned = clean_screw(Twist(Vector(*numbers[:3]), Vector(*numbers[3:])), 1.0).components()
-    return np.array(cleaned)[parts] * mechanism.twist_units[0, parts]
+    return np.array(cleaned)[places] * mechanism.twist_units[0, places]
 
 
 def _clean_stiffness(stiffness: Array) -> Array | None:
@@ -357,10 +361,10 @@ def _clean_stiffness(stiffness: Array) -> Array | None:
 def _without_rest(state: MachineState) -> LoadedState:
     """The answer for a machine that comes to no rest: its last state of rest while the loads grew."""
     family, limit = state.machine.family, state.limit
-    names, parts, message = family.component_names, list(family.components), why_no_rest(state.machine, limit)
+    names, places, message = family.component_names, list(family.components), why_no_rest(state.machine, limit)
     if limit is None:
         return LoadedState(state, Rest.NO_REST, message, names)
-    mode = (limit.stability.mode * state.mechanism.twist_units[0])[parts]
+    mode = (limit.stability.mode * state.mechanism.twist_units[0])[places]
     legs = moving_legs(limit.balance, limit.stability) if mode.any() else []
     return LoadedState(state, Rest.NO_REST, message, names, factor=limit.share, mode=mode, mode_legs=tuple(legs))
 
