@@ -238,11 +238,9 @@ def load_curve(machine: Machine | MachineState, shares: Sequence[float] = CURVE_
     for share in shares:
         solution = at_rest(with_share(mechanism, share, preload=1.0), last)
         springs_at_rest, state_at_rest = _spring_states(solution.balance), solution.balance.state
-        comes_to_rest = bool(solution.settled[0])
-        one_or_nan = 1.0 if comes_to_rest else math.nan
+        one_or_nan, last = (1.0, state_at_rest) if solution.settled[0] else (math.nan, last)
         displacements.append(one_or_nan * _in_si(mechanism, state_at_rest.platform.amounts()[0], places))
         loads.append([one_or_nan * spring.load for spring in springs_at_rest])
-        last = state_at_rest if comes_to_rest else last
     names = tuple(spring.name for spring in springs_at_rest)
     return LoadCurve(np.array(shares), np.array(displacements), names, np.array(loads))
 
@@ -255,12 +253,11 @@ def _answer_at_rest(state: MachineState, equations: Balance, stability: Stabilit
     all_compliances = platform_compliance(equations)
     compliances = (all_compliances * mechanism.compliance_units)[0][square]
     springs_alone = (elastic_stiffness(equations, all_compliances) / mechanism.compliance_units)[0][square]
-    rest = Rest.OK if within(_limits_at_rest(state)) else Rest.JOINT_LIMIT
-    if not stability.stable or any(strut.bends_away for strut in state.struts):
-        rest = Rest.UNSTABLE
+    stays = stability.stable and not any(strut.bends_away for strut in state.struts)
+    rest_within_limits = Rest.OK if within(_limits_at_rest(state)) else Rest.JOINT_LIMIT
     return LoadedState(
         state=state,
-        rest=rest,
+        rest=rest_within_limits if stays else Rest.UNSTABLE,
         reason="",
         components=machine.family.component_names,
         displacement=_in_si(mechanism, equations.state.platform.amounts()[0], places),
