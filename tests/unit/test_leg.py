@@ -113,7 +113,9 @@ def test_a_moved_chain_has_moved_screws(points, reference, motion):
     moved, still = leg.displaced(motion), leg
     assert moved.name == still.name
     assert [s.name for s in moved.springs] == [s.name for s in still.springs]
-    before = [j.twist(reference).rotated(motion.rotation) for j in (*still.passive, *(s.joint for s in still.springs))]
+    before = [
+        j.twist(reference).turned_by(motion.rotation) for j in (*still.passive, *(s.joint for s in still.springs))
+    ]
     after = [j.twist(motion.apply(reference)) for j in (*moved.passive, *(s.joint for s in moved.springs))]
     for ours, theirs in zip(after, before, strict=True):
         assert np.allclose(screw(ours), screw(theirs), rtol=0, atol=100 * FEW)
@@ -135,7 +137,7 @@ def test_a_screw_joint_advances_as_it_turns(pitch, reference):
 def test_a_moved_leg_has_moved_screws(leg, reference, motion):
     moved = leg.displaced(motion).screws(motion.apply(reference), 1.0)
     for after, before in zip(moved.wrenches, leg.screws(reference, 1.0).wrenches, strict=True):
-        assert np.allclose(screw(after), screw(before.rotated(motion.rotation)), atol=100 * FEW)
+        assert np.allclose(screw(after), screw(before.turned_by(motion.rotation)), atol=100 * FEW)
 
 
 @given(st.integers(1, 5), st.data())

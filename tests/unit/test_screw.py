@@ -42,7 +42,7 @@ def test_power_does_not_depend_on_point_or_axes(wrench, twist, offset, turn):
     power = wrench.work(twist)
     assert power == pytest.approx(screw(wrench) @ screw(twist), abs=FEW)
     assert wrench.at_offset(offset).work(twist.at_offset(offset)) == pytest.approx(power, abs=FEW)
-    assert wrench.rotated(turn).work(twist.rotated(turn)) == pytest.approx(power, abs=FEW)
+    assert wrench.turned_by(turn).work(twist.turned_by(turn)) == pytest.approx(power, abs=FEW)
 
 
 @pytest.mark.parametrize("kind", [Twist, Wrench])
@@ -52,14 +52,16 @@ def test_transport_is_a_group_action(kind, parts, first, second, turn):
     assert near(one.at_offset(first).at_offset(second), one.at_offset(first + second))
     assert near(one.at_offset(first).at_offset(-first), one)
     assert near(one.at_offset(ZERO), one)
-    assert near(one.at_offset(first).rotated(turn), one.rotated(turn).at_offset(turn.apply(first)))
+    assert near(one.at_offset(first).turned_by(turn), one.turned_by(turn).at_offset(turn.apply(first)))
 
 
 @given(twists, wrenches, vectors(FAR), rotations())
 def test_transport_is_the_adjoint_matrix(twist, wrench, offset, turn):
     q, d = matrix(turn), vector(offset)
-    assert np.allclose(screw(twist.rotated(turn).at_offset(offset)), twist_transport(q, d) @ screw(twist), atol=FEW)
-    assert np.allclose(screw(wrench.rotated(turn).at_offset(offset)), wrench_transport(q, d) @ screw(wrench), atol=FEW)
+    assert np.allclose(screw(twist.turned_by(turn).at_offset(offset)), twist_transport(q, d) @ screw(twist), atol=FEW)
+    assert np.allclose(
+        screw(wrench.turned_by(turn).at_offset(offset)), wrench_transport(q, d) @ screw(wrench), atol=FEW
+    )
     assert np.allclose(wrench_transport(q, d).T @ twist_transport(q, d), np.eye(6), atol=FEW)
 
 
@@ -97,4 +99,4 @@ def test_a_displaced_joint_has_the_displaced_twist(axis, point, reference, motio
     """Moving joint and reference point together turns the twist and nothing else."""
     for joint in (Joint(axis, point), Joint(axis)):
         moved = joint.displaced(motion).twist(motion.apply(reference))
-        assert near(moved, joint.twist(reference).rotated(motion.rotation))
+        assert near(moved, joint.twist(reference).turned_by(motion.rotation))

@@ -42,7 +42,7 @@ class Screw:
     def __mul__(self, factor: Scalar) -> Self:
         return type(self)(self.rotational * factor, self.translational * factor)
 
-    def rotated(self, rotation: Rotation) -> Self:
+    def turned_by(self, rotation: Rotation) -> Self:
         """The same screw carried along by a rotation of everything about the reference point."""
         return type(self)(rotation.apply(self.rotational), rotation.apply(self.translational))
 
@@ -56,7 +56,7 @@ class Twist(Screw):
         return Twist(self.rotational, self.translational + self.rotational.cross(offset))
 
     @property
-    def slides(self) -> bool:
+    def is_translation(self) -> bool:
         """Whether it is a translation by form: its angular part is exactly zero, not only small."""
         return all(is_zero(c) for c in self.rotational.components())
 

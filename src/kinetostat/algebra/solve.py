@@ -8,6 +8,7 @@ Source: theory (1), (6), (7) and (9); G. H. Golub and C. F. Van Loan, Matrix Com
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from kinetostat.algebra.scalar import (
     Scalar,
@@ -98,13 +99,22 @@ def dual_basis(
     return dual, _singularity_margin(basis, inverse, solved.least, squares)
 
 
-def right_inverse(rows: Sequence[Sequence[Scalar]]) -> tuple[list[Row], list[Row], Scalar]:
-    """Solve A x = b for n independent rows of m >= n components: x = A+ b plus any mix of null vectors.
+class RightInverse(NamedTuple):
+    """All solutions of A x = b for n independent rows of m >= n components: x = A+ b plus any mix of null vectors.
 
-    Returns:
-        A+ as m rows of n scalars (the solution of least norm); the m - n orthonormal null vectors of m scalars; and the
-        singularity margin n / (|A| |A+|), as in `dual_basis`.
+    Attributes:
+        solution: A+ as m rows of n scalars: the solution of least norm.
+        null: the m - n orthonormal null vectors, of m scalars each.
+        margin: the singularity margin n / (|A| |A+|), as in `dual_basis`.
     """
+
+    solution: list[Row]
+    null: list[Row]
+    margin: Scalar
+
+
+def right_inverse(rows: Sequence[Sequence[Scalar]]) -> RightInverse:
+    """Solve A x = b, by the rows of A."""
     solved = _triangularise(rows)
     size, steps, images = len(rows), solved.inverse(), solved.images
     solution = [
@@ -112,7 +122,7 @@ def right_inverse(rows: Sequence[Sequence[Scalar]]) -> tuple[list[Row], list[Row
         for column in images
     ]
     null = [[column[row] for column in images] for row in solved.free]
-    return solution, null, _singularity_margin(rows, steps, solved.least)
+    return RightInverse(solution, null, _singularity_margin(rows, steps, solved.least))
 
 
 def complement(vectors: Sequence[Sequence[Scalar]]) -> tuple[list[Row], Scalar]:
@@ -281,11 +291,11 @@ def conjugate(columns: Sequence[Sequence[Scalar]], weights: Sequence[Scalar], sq
         pivot = _product(weighted_column, column)
         round_off = growth[k] * growth[k]
         size = _squared_shares(column, weights, scales)
-        seen = size > CLOSING_ROUND_OFF * CLOSING_ROUND_OFF * round_off
-        unsure = where(size > SURELY_MORE * SURELY_MORE * round_off, 0.0, 1.0)
-        doubt = larger(doubt, where(seen, unsure, 0.0))
-        pivots.append(where(seen, pivot, 0.0))
-        inverses.append(where(seen, reciprocal(where(seen, pivot, 1.0)), 0.0))
+        is_seen = size > CLOSING_ROUND_OFF * CLOSING_ROUND_OFF * round_off
+        doubt_if_seen = where(size > SURELY_MORE * SURELY_MORE * round_off, 0.0, 1.0)
+        doubt = larger(doubt, where(is_seen, doubt_if_seen, 0.0))
+        pivots.append(where(is_seen, pivot, 0.0))
+        inverses.append(where(is_seen, reciprocal(where(is_seen, pivot, 1.0)), 0.0))
         for i in range(k + 1, len(reduced)):
             share = weighted(_product(weighted_column, reduced[i]), inverses[k])
             shares[i].append(share)
@@ -403,11 +413,11 @@ def semidefinite_root(rows: Sequence[Sequence[Scalar]]) -> list[Row]:
     rest: list[Row] = [list(row) for row in rows]
     root: list[Row] = [[0.0 for _ in size] for _ in size]
     for k in size:
-        resisted = rest[k][k] > UNRESISTED * abs(rows[k][k])
-        pivot_root = sqrt(where(resisted, rest[k][k], 1.0))
-        root[k][k] = where(resisted, pivot_root, 0.0)
+        is_resisted = rest[k][k] > UNRESISTED * abs(rows[k][k])
+        pivot_root = sqrt(where(is_resisted, rest[k][k], 1.0))
+        root[k][k] = where(is_resisted, pivot_root, 0.0)
         for i in range(k + 1, len(rows)):
-            root[i][k] = where(resisted, rest[i][k] / pivot_root, 0.0)
+            root[i][k] = where(is_resisted, rest[i][k] / pivot_root, 0.0)
             for j in range(k + 1, i + 1):
                 rest[i][j] = rest[i][j] - root[i][k] * root[j][k]
     return root

@@ -15,9 +15,11 @@ from kinetostat.algebra.screw import Screw
 from kinetostat.frozen import dataclass
 
 SIZE = 6
+"""Rows of K and C: the components of a screw."""
 POSITIONS = [(i, j) for i in range(SIZE) for j in range(i, SIZE)]
 """Row and column of each of the 21 stored entries."""
 _INDEX = {position: k for k, position in enumerate(POSITIONS)}
+"""The place of each of these entries, by its row and column."""
 
 
 @dataclass(frozen=True)

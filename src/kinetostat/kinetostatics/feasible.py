@@ -71,16 +71,18 @@ def transmission(configuration: Configuration, legs: Sequence[LegScrews], guide:
     columns = [_components_in_newtons(wrench, shrink) for wrench in wrenches]
     if len(columns) < SIZE:
         return Transmission((), (), False, None, (), configuration.length, 0.0)
-    balance, null, margin = right_inverse([list(row) for row in zip(*columns, strict=True)])
+    balances = right_inverse([list(row) for row in zip(*columns, strict=True)])
     shares, internal, driving, constraints = [], [], [], list(guide)
-    first, each_drive_moves, doubtful = 0, True, False
+    first, each_drive_moves, doubtful = 0, True, False  # `first`: number of the leg's first wrench among all
     for leg, screws in zip(configuration.legs, rigid, strict=True):
         rows = _loads_of_drives(leg, screws)
         for row in rows:
             # The load of the drive by the amounts of the leg's wrenches that balance a unit wrench, or each other.
-            amounts = [total([c * balance[first + i][j] for i, c in enumerate(row)]) for j in range(SIZE)]
+            amounts = [total([c * balances.solution[first + i][j] for i, c in enumerate(row)]) for j in range(SIZE)]
             shares.append(Twist(Vector(*amounts[:3]) * shrink, Vector(*amounts[3:])))
-            internal.append(tuple(total([c * column[first + i] for i, c in enumerate(row)]) for column in null))
+            internal.append(
+                tuple(total([c * column[first + i] for i, c in enumerate(row)]) for column in balances.null)
+            )
         of_drives, undriven = _by_drives(screws.wrenches, rows)
         each_drive_moves, doubtful = each_drive_moves and of_drives is not None, doubtful or bool(undriven)
         driving += of_drives or []
@@ -93,7 +95,7 @@ def transmission(configuration: Configuration, legs: Sequence[LegScrews], guide:
         wrenches=tuple(driving) if each_drive_moves else None,
         constraints=tuple(wrench * _reciprocal_size(_components_in_newtons(wrench, shrink)) for wrench in constraints),
         length=configuration.length,
-        margin=margin,
+        margin=balances.margin,
     )
 
 
@@ -184,10 +186,10 @@ def wrench_faces(
     for mix in _circuits(drives):
         lower, upper, normal = 0.0, 0.0, NO_MOTION
         for drive, amount in mix:
-            low, high = bounds[drive]
-            ends = _times(amount, low), _times(amount, high)
-            before = amount * carried[drive]
-            lower, upper = lower + smaller(*ends) - before, upper + larger(*ends) - before
+            least, most = bounds[drive]
+            ends = _times(amount, least), _times(amount, most)
+            load_before = amount * carried[drive]
+            lower, upper = lower + smaller(*ends) - load_before, upper + larger(*ends) - load_before
             normal = normal + drives.shares[drive] * amount
         faces.append(Face(normal, lower, upper, tuple(drive for drive, _ in mix)))
     return faces
@@ -201,7 +203,7 @@ def _times(amount: Scalar, bound: Scalar) -> Scalar:
 
 
 def _circuits(drives: Transmission) -> list[list[tuple[int, Scalar]]]:
-    """The mixes of fewest drives which no internal load enters: drives with their amounts.
+    """The mixes of the fewest drives that no internal load enters: drives with their amounts.
 
     The amounts of a mix are minors of the matrix of internal loads, with a row for each drive: the determinants that
     remain when one of the mix's rows is left out, with alternating signs (Cramer's rule).

@@ -371,9 +371,9 @@ class Leg:
         It is 1 for a slide, and length² + arm² for a turn, m². All turns have the arm of the first one: only the
         magnitude counts, and traced programs then need one product.
         """
-        turning = next((twist for twist in elastic if not twist.slides), None)
+        turning = next((twist for twist in elastic if not twist.is_translation), None)
         square = 1.0 if turning is None else length * length + turning.translational.dot(turning.translational)
-        return tuple(1.0 if twist.slides else square for twist in elastic)
+        return tuple(1.0 if twist.is_translation else square for twist in elastic)
 
     def _slide_along(self, direction: Vector) -> Vector:
         """A direction as the axis of a sprung slide along it has it, which may know more: how its link carries it."""

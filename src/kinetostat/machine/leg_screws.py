@@ -88,7 +88,7 @@ def reciprocal_wrenches(passive: Sequence[Twist], length: Scalar) -> tuple[tuple
 
 def comparable(twist: Twist, shrink: Scalar) -> tuple[Scalar, ...]:
     """The components of a unit twist, translations times `shrink` (1/m); a slide stays of unit size."""
-    if twist.slides:
+    if twist.is_translation:
         return twist.components()
     return Twist(twist.rotational, twist.translational * shrink).components()
 

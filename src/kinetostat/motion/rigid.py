@@ -318,7 +318,7 @@ def _friction(leg: ElasticLeg, number: int, screws: Sequence[Twist], machine: Ma
     """Return the friction of the coordinate with this number of a leg with these screws."""
     damping = machine.tables["damping"]
     motions = [i for i, coordinate in enumerate(leg.chain.coordinate) if coordinate == number]
-    slides = all(screws[i].slides for i in motions)
+    slides = all(screws[i].is_translation for i in motions)
     coulomb = damping.slide_friction if slides else damping.hinge_friction * (1.0 / length)
     if len(motions) > 1 and not slides:  # the bars of a parallelogram turn about both of their ends
         coulomb = coulomb * total([screws[i].rotational.norm() for i in motions])
@@ -415,7 +415,9 @@ def _balls(screws: Sequence[Twist], coordinates: Sequence[int], passive: int) ->
     result, first = [], 0
     while first + 3 <= passive:
         numbers = [number for row in motions[first : first + 3] for number in row]
-        is_row_of_turns = numbers == [numbers[0] + k for k in range(3)] and not any(screws[i].slides for i in numbers)
+        is_row_of_turns = numbers == [numbers[0] + k for k in range(3)] and not any(
+            screws[i].is_translation for i in numbers
+        )
         if is_row_of_turns and _meet_in_a_point([screws[i] for i in numbers]):
             result.append((first, first + 1, first + 2))
             first += 2

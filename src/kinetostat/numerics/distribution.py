@@ -248,7 +248,7 @@ class _DualSearch:
     def __init__(self, sides: Array, ends: Array) -> None:
         """Begin at the origin; arguments as of `nearest_to_origin`."""
         count, _, size = sides.shape
-        self._sides, self._ends = sides, ends
+        self._sides, self._ends = sides, ends.copy()  # `change` takes out conditions that hold but for round-off
         self._lengths = np.maximum(np.sqrt((sides * sides).sum(axis=2)), UNRESISTED)
         self.points, self.exist = np.zeros((count, size)), np.ones(count, dtype=bool)
         # Conditions that hold exactly, and the one that is being taken in, with their multipliers.
@@ -262,44 +262,56 @@ class _DualSearch:
             Their numbers, and what is lacking of that condition [rows].
         """
         lacking = self._ends[rows] - np.einsum("nkr,nr->nk", self._sides[rows], self.points[rows])
-        waits = self._entering[rows] == NO_CONDITION
+        has_none_begun = self._entering[rows] == NO_CONDITION
         worst = (lacking / self._lengths[rows]).argmax(axis=1)
-        met = lacking.max(axis=1) <= UNRESISTED
-        self._entering[rows] = np.where(waits, worst, self._entering[rows])
-        self._entering_pull[rows] = np.where(waits, 0.0, self._entering_pull[rows])
-        going = ~(waits & met)
-        rows = rows[going]
-        return rows, lacking[going, self._entering[rows]]
+        all_hold = lacking.max(axis=1) <= UNRESISTED
+        self._entering[rows] = np.where(has_none_begun, worst, self._entering[rows])
+        self._entering_pull[rows] = np.where(has_none_begun, 0.0, self._entering_pull[rows])
+        is_open = ~(has_none_begun & all_hold)
+        rows = rows[is_open]
+        return rows, lacking[is_open, self._entering[rows]]
 
     def change(self, rows: Integers, lacking: Array) -> None:
         """Move points towards the entering conditions, until these hold or an active one would pull the wrong way."""
-        size, entering = self.points.shape[1], self._entering[rows]
-        numbers, at_bound = np.arange(len(rows)), self._active[rows] != NO_CONDITION
-        normal = self._sides[rows, entering]
-        # The normal without its shares along those of active conditions, which stay as they are.
-        others = np.where(at_bound[:, :, None], self._sides[rows[:, None], self._active[rows]], 0.0)
-        square = np.einsum("nar,nbr->nab", others, others) + np.eye(size) * ~at_bound[:, None, :]
-        share = np.linalg.solve(square, np.einsum("nar,nr->na", others, normal)[:, :, None])[:, :, 0]
-        step = normal - np.einsum("nar,na->nr", others, share)
+        size, entering, is_active = self.points.shape[1], self._entering[rows], self._active[rows] != NO_CONDITION
+        step, share = self._steps(rows, is_active)
         gain = (step * step).sum(axis=1)
         moves = gain > INDEPENDENT_CONDITION * self._lengths[rows, entering] ** 2
         with np.errstate(all="ignore"):
-            until_free = np.where(at_bound & (share > UNRESISTED), self._pull[rows] / share, np.inf)
+            until_released = np.where(is_active & (share > UNRESISTED), self._pull[rows] / share, np.inf)
             until_met = np.where(moves, lacking / gain, np.inf)
-        leaving = until_free.argmin(axis=1) if size else np.zeros(len(rows), dtype=int)
-        first_free = until_free[numbers, leaving] if size else np.full(len(rows), np.inf)
-        amount = np.minimum(first_free, until_met)
-        stuck = np.isinf(amount)
-        self.exist[rows[stuck & (lacking > BALANCED)]] = False
-        self._ends[rows[stuck], entering[stuck]] = -np.inf  # it is met but for round-off, and is not asked again
-        amount = np.where(stuck, 0.0, amount)
-        self.points[rows] += np.where(moves & ~stuck, amount, 0.0)[:, None] * step
-        self._pull[rows] = np.where(at_bound, self._pull[rows] - amount[:, None] * share, 0.0)
+        # Without any unknown there is no slot for an active condition, and none is released.
+        leaving = until_released.argmin(axis=1) if size else np.zeros(len(rows), dtype=int)
+        first_released = until_released[np.arange(len(rows)), leaving] if size else np.full(len(rows), np.inf)
+        amount = np.minimum(first_released, until_met)
+        is_stuck = np.isinf(amount)
+        self.exist[rows[is_stuck & (lacking > BALANCED)]] = False
+        self._ends[rows[is_stuck], entering[is_stuck]] = -np.inf  # it holds but for round-off, and is not asked again
+        amount = np.where(is_stuck, 0.0, amount)
+        self.points[rows] += np.where(moves & ~is_stuck, amount, 0.0)[:, None] * step
+        self._pull[rows] = np.where(is_active, self._pull[rows] - amount[:, None] * share, 0.0)
         self._entering_pull[rows] += amount
-        met = ~stuck & (until_met <= first_free)
-        slots = np.argmin(at_bound, axis=1) if size else leaving
-        self._active[rows[met], slots[met]] = entering[met]
-        self._pull[rows[met], slots[met]] = self._entering_pull[rows[met]]
-        self._entering[rows[stuck | met]] = NO_CONDITION
-        freed = ~stuck & ~met
-        self._active[rows[freed], leaving[freed]], self._pull[rows[freed], leaving[freed]] = NO_CONDITION, 0.0
+        is_met = ~is_stuck & (until_met <= first_released)
+        self._take_in(rows[is_met], is_active[is_met])
+        self._entering[rows[is_stuck | is_met]] = NO_CONDITION
+        releases = ~is_stuck & ~is_met
+        released = rows[releases], leaving[releases]
+        self._active[released], self._pull[released] = NO_CONDITION, 0.0
+
+    def _steps(self, rows: Integers, is_active: Mask) -> tuple[Array, Array]:
+        """The normals of entering conditions without their shares along those of active ones, and these shares.
+
+        Along such a step the active conditions stay as they are.
+        """
+        normal = self._sides[rows, self._entering[rows]]
+        others = np.where(is_active[:, :, None], self._sides[rows[:, None], self._active[rows]], 0.0)
+        square = np.einsum("nar,nbr->nab", others, others) + np.eye(self.points.shape[1]) * ~is_active[:, None, :]
+        share = np.linalg.solve(square, np.einsum("nar,nr->na", others, normal)[:, :, None])[:, :, 0]
+        return normal - np.einsum("nar,na->nr", others, share), share
+
+    def _take_in(self, rows: Integers, is_active: Mask) -> None:
+        """Put entering conditions that now hold, with their multipliers, into the first slot without a condition."""
+        if not len(rows):
+            return
+        slots = rows, np.argmin(is_active, axis=1)
+        self._active[slots], self._pull[slots] = self._entering[rows], self._entering_pull[rows]

@@ -54,10 +54,10 @@ def _cut(nodes: Array, values: Array) -> list[Array]:
     triangles_of = []
     for inner, triangles in cut_edges.items():
         chosen = count == inner
-        corners, at = nodes[chosen], values[chosen]
+        corners, corner_values = nodes[chosen], values[chosen]
         outward = corners[:, inner:].mean(axis=1) - corners[:, :inner].mean(axis=1)
         for edges in triangles:
-            points = np.stack([_crossing(corners, at, *edge) for edge in edges], axis=1)
+            points = np.stack([_crossing(corners, corner_values, *edge) for edge in edges], axis=1)
             normal = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
             inverted = (normal * outward).sum(axis=1) < 0.0
             points[inverted] = points[inverted][:, ::-1]
@@ -66,5 +66,6 @@ def _cut(nodes: Array, values: Array) -> list[Array]:
 
 
 def _crossing(corners: Array, values: Array, first: int, other: int) -> Array:
+    """Return the points at which the field is zero on an edge, which is linear along it [n x 3]."""
     share = -values[:, first] / (values[:, other] - values[:, first])
     return corners[:, first] + share[:, None] * (corners[:, other] - corners[:, first])

@@ -120,7 +120,7 @@ class Faces:
 
 
 def faces(wrenches: Array) -> Faces:
-    """Find the normals of all faces of the sets of wrenches.
+    """Find the normals of all faces of the sets of wrenches in d >= 2 dimensions.
 
     The normal is the cross product of the d - 1 wrenches in the face, whose components are their minors. Minors of the
     first wrenches belong to many faces and are computed once.
@@ -166,7 +166,8 @@ def capacity(wrenches: Array, least: Array, most: Array, required: Array, box: A
     """The distance of required wrenches from the faces of the set that forces within bounds can hold [n].
 
     It is the distance of the outermost required wrench from the nearest face, negative if that wrench is outside. It is
-    infinite if the set has no face, and NaN if the wrenches of all forces span two dimensions less than their space.
+    infinite if the set has no face, and NaN if every face is degenerate: the wrenches of all forces then span at most
+    d - 2 of d >= 2 dimensions.
 
     Args:
         wrenches: wrenches of unit forces, as columns [n x d x m].
@@ -176,16 +177,17 @@ def capacity(wrenches: Array, least: Array, most: Array, required: Array, box: A
     """
     count, size, forces = wrenches.shape
     result = np.empty(count)
-    half = np.zeros((count, size)) if box is None else box
-    for part in _slabs(count, size, forces):
-        faces_of_part = faces(wrenches[part].transpose(1, 2, 0))
-        normals = faces_of_part.normals
-        above, below = faces_of_part.ends(least[part].T, most[part].T)
-        along = np.stack([_dot(normals, wrench.T) for wrench in required[part].transpose(1, 0, 2)])
-        inside = np.minimum(above - along.max(axis=0), below + along.min(axis=0)) - _dot(np.abs(normals), half[part].T)
-        known = ~np.isnan(normals[0])
-        distance = np.where(known, inside, np.inf).min(axis=0)
-        result[part] = np.where(known.any(axis=0), np.where(distance > FARTHEST_FACE, np.inf, distance), np.nan)
+    half_sizes = np.zeros((count, size)) if box is None else box
+    for slab in _slabs(count, size, forces):
+        slab_faces = faces(wrenches[slab].transpose(1, 2, 0))
+        normals = slab_faces.normals
+        above, below = slab_faces.ends(least[slab].T, most[slab].T)
+        along = np.stack([_dot(normals, wrench.T) for wrench in required[slab].transpose(1, 0, 2)])
+        to_faces = np.minimum(above - along.max(axis=0), below + along.min(axis=0))
+        to_faces = to_faces - _dot(np.abs(normals), half_sizes[slab].T)
+        is_face = ~np.isnan(normals[0])
+        distance = np.where(is_face, to_faces, np.inf).min(axis=0)
+        result[slab] = np.where(is_face.any(axis=0), np.where(distance > FARTHEST_FACE, np.inf, distance), np.nan)
     return result
 
 
@@ -206,6 +208,8 @@ def wrench_closure(wrenches: Array) -> Array:
 
 
 def _slabs(count: int, size: int, forces: int) -> Iterator[slice]:
-    widest = max(math.comb(forces, order) * math.comb(size, order) for order in range(1, size))
-    step = max(1, MOST_NUMBERS // max(widest, math.comb(forces, size - 1) * forces))
+    """Part n sets into slabs whose largest array, of minors or of pulls, has at most `MOST_NUMBERS` entries."""
+    minors = max(math.comb(forces, order) * math.comb(size, order) for order in range(1, size))
+    pulls = math.comb(forces, size - 1) * forces
+    step = max(1, MOST_NUMBERS // max(minors, pulls))
     return (slice(start, start + step) for start in range(0, count, step))

@@ -351,7 +351,7 @@ def _stiffness_by_legs(response: Response, turn: Rotation, length: float) -> Arr
         compliance = np.array(leg.compliance, dtype=float)
         if not (float(leg.singularity_margin) > SINGULAR and np.isfinite(compliance).all()):
             return None
-        wrenches = np.array([w.rotated(turn).components() for w in leg.wrenches], dtype=float).reshape(-1, 6).T
+        wrenches = np.array([w.turned_by(turn).components() for w in leg.wrenches], dtype=float).reshape(-1, 6).T
         loads = np.array(leg.loads, dtype=float).reshape(len(compliance), -1)
         if not (np.isfinite(wrenches).all() and np.isfinite(loads).all()):
             return None
@@ -388,10 +388,10 @@ def _turned_statics(statics: Statics, turn: Rotation) -> Statics:
     """Return the statics with `turn` applied to every screw from which K, C and their attribution are computed."""
     return replace(
         statics,
-        flexibility=tuple(twist.rotated(turn) for twist in statics.flexibility),
-        resistance=tuple(wrench.rotated(turn) for wrench in statics.resistance),
-        motions=tuple((twist.rotated(turn), s) for twist, s in statics.motions),
-        actions=tuple((wrench.rotated(turn), k) for wrench, k in statics.actions),
+        flexibility=tuple(twist.turned_by(turn) for twist in statics.flexibility),
+        resistance=tuple(wrench.turned_by(turn) for wrench in statics.resistance),
+        motions=tuple((twist.turned_by(turn), s) for twist, s in statics.motions),
+        actions=tuple((wrench.turned_by(turn), k) for wrench, k in statics.actions),
     )
 
 

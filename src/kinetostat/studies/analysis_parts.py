@@ -185,13 +185,13 @@ def load_case(
     if not any(wrench.components()):
         return None
     length = float(response.configuration.length)
-    load = clean_screw(wrench.rotated(turn), length)
+    load = clean_screw(wrench.turned_by(turn), length)
     size_of_load = float(wrench.rotational.norm() + wrench.translational.norm() * length)
     rows = list(components)
     loads_of_springs = zip(springs(response.configuration), spring_loads(response, wrench), strict=True)
     reactions = []
     for at_joint in joint_reactions(response, wrench):
-        cleaned = clean_screw(at_joint.wrench.rotated(turn), length, size_of_load)
+        cleaned = clean_screw(at_joint.wrench.turned_by(turn), length, size_of_load)
         passed_on = np.array(cleaned.components(), dtype=float)[rows]
         reactions.append(Reaction(leg=at_joint.leg, joint=at_joint.joint, point=at_joint.point, wrench=passed_on))
     return LoadCase(
