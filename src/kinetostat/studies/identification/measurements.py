@@ -96,14 +96,9 @@ class Measurements:
         """Number of measured values."""
         return int(sum(np.isfinite(values).sum() for values in self.values.values()))
 
-    @property
-    def loaded(self) -> bool:
-        """Whether any wrench acts."""
-        return bool(self.wrenches.any())
-
-    def refusal(self, row: int, mistake: str) -> InputError:
+    def refusal(self, pose: int, mistake: str) -> InputError:
         """The message about a mistake at a pose, with file and line."""
-        return InputError(f'"{self.path}", line {self.lines[row]}: {mistake}')
+        return InputError(f'"{self.path}", line {self.lines[pose]}: {mistake}')
 
 
 def read_measurements(machine: Machine, path: Path, sigmas: Sigmas) -> Measurements:
@@ -172,18 +167,18 @@ def _commanded_pose(
 
 def _by_group(columns: Sequence[GivenColumn]) -> dict[str, list[GivenColumn]]:
     """The columns by their group: a key of `COLUMN_GROUPS`, "actuator", "wrench", or "" for coordinates of the pose."""
-    result: dict[str, list[GivenColumn]] = {}
+    groups: dict[str, list[GivenColumn]] = {}
     for column in columns:
-        head, _, rest = column.name.partition(".")
-        if rest and head in (*COLUMN_GROUPS, "actuator"):
-            group = head
+        word, _, name = column.name.partition(".")
+        if name and word in (*COLUMN_GROUPS, "actuator"):
+            group = word
         else:
             group = "wrench" if column.name in WRENCH_COLUMNS else ""
-        if group in COLUMN_GROUPS and rest not in COLUMN_GROUPS[group]:
+        if group in COLUMN_GROUPS and name not in COLUMN_GROUPS[group]:
             allowed = ", ".join(f"{group}.{name}" for name in COLUMN_GROUPS[group])
             raise InputError(f"there is no column {column.name}; choose from {allowed}.")
-        result.setdefault(group, []).append(column)
-    return result
+        groups.setdefault(group, []).append(column)
+    return groups
 
 
 def _name_in_group(column: GivenColumn) -> str:
@@ -200,24 +195,24 @@ def _numbers(column: GivenColumn, kind: str, where: Where) -> Array:
 
     An angle of a platform is at most half a turn; an actuator may turn farther.
     """
-    result = np.full(len(column.entries), np.nan)
+    numbers = np.full(len(column.entries), np.nan)
     of_platform = kind == "angle" and not column.name.startswith(("sigma", "actuator."))
-    bounds = Quantity(kind, "", positive=column.name.startswith("sigma"))
+    quantity = Quantity(kind, "", positive=column.name.startswith("sigma"))
     for row, entry in enumerate(column.entries):
         text = str(entry).strip()
         if not text:
             continue
         try:
             without_unit = (column.unit and text[-1].isdecimal()) or text.endswith(".")
-            result[row] = bounds.number(f"{text} {column.unit}" if without_unit else text)
+            numbers[row] = quantity.number(f"{text} {column.unit}" if without_unit else text)
         except UnitError as error:
             raise InputError(f"{where(column.name, row)} is {shorten(text)}: {error}.") from None
-        if of_platform and abs(result[row]) > HALF_TURN:
+        if of_platform and abs(numbers[row]) > HALF_TURN:
             raise InputError(
-                f"{where(column.name, row)} is {np.degrees(result[row]):.6g} deg, more than half a turn, which no "
+                f"{where(column.name, row)} is {np.degrees(numbers[row]):.6g} deg, more than half a turn, which no "
                 "orientation has; check the unit in the head of the column."
             )
-    return result
+    return numbers
 
 
 def _measurements(
@@ -259,14 +254,15 @@ def _measurements(
 
 def _check_origins_and_loads(data: Measurements) -> None:
     """Refuse distances from nowhere, and deflections under no load."""
+    has_origin, has_load = np.isfinite(data.origins).all(axis=1), data.wrenches.any(axis=1)
     for name, entries in data.values.items():
-        rows = np.flatnonzero(np.isfinite(entries))
-        if name == "distance" and not np.isfinite(data.origins[rows]).all():
-            row = int(rows[~np.isfinite(data.origins[rows]).all(axis=1)][0])
-            raise data.refusal(row, "a distance is measured, but not from where; add from.x, from.y and from.z [mm].")
-        if name.startswith("deflection") and not data.wrenches[rows].any(axis=1).all():
-            row = int(rows[~data.wrenches[rows].any(axis=1)][0])
-            raise data.refusal(row, "a deflection is measured without a load; add columns such as force.z [N].")
+        is_measured = np.isfinite(entries)
+        if name == "distance" and (is_measured & ~has_origin).any():
+            pose = int(np.argmax(is_measured & ~has_origin))
+            raise data.refusal(pose, "a distance is measured, but not from where; add from.x, from.y and from.z [mm].")
+        if name.startswith("deflection") and (is_measured & ~has_load).any():
+            pose = int(np.argmax(is_measured & ~has_load))
+            raise data.refusal(pose, "a deflection is measured without a load; add columns such as force.z [N].")
 
 
 def _have_sigmas(values: Mapping[str, Array], stated: Mapping[str, Array]) -> bool:
@@ -291,13 +287,13 @@ def _from_actuators(machine: Machine, columns: Sequence[GivenColumn], where: Whe
     """The poses of the drawn machine where its actuators are commanded, by leaf path, SI [n]."""
     system = system_of(machine)
     goals = np.tile([float(actuator.coordinate) for actuator in system.actuators], (len(columns[0].entries), 1))
-    names = {key: n for n, a in enumerate(system.actuators) for key in (a.name, a.leg)}
+    number_by_name = {name: n for n, actuator in enumerate(system.actuators) for name in (actuator.name, actuator.leg)}
     for column in columns:
         name = _name_in_group(column)
-        if name not in names:
+        if name not in number_by_name:
             known = ", ".join(f"actuator.{actuator.leg}" for actuator in system.actuators)
             raise InputError(f"there is no column {column.name}; choose from {known}.")
-        number = names[name]
+        number = number_by_name[name]
         goals[:, number] = _numbers(column, system.actuators[number].kind, where)
     poses, placed = poses_at(system, goals)
     if not placed.all():

@@ -82,7 +82,7 @@ class Observation:
         errors, per_spring = self.errors(values), self._deflections_per_spring
         deflection = per_spring @ (1.0 + errors[self._first_spring :])
         target = self._target_at(self.model.displacement(errors)[0] + deflection, values)
-        return self._over_sigma(self._values(target.in_frame, deflection))
+        return self._residuals_of(self._predicted_values(target.in_frame, deflection))
 
     def linearisation(self, values: Array) -> tuple[Array, Array]:
         """The residuals, and how each falls per unit of each unknown [rows x unknowns], theory (64).
@@ -97,8 +97,8 @@ class Observation:
         target = self._target_at(displacement + deflection, values)
         twists = self.twists(np.concatenate([error_rates[:, :, : self._first_spring], per_spring], axis=2))
         rates = target.rates(twists, [unknown.path for unknown in self.unknowns])
-        rows = self._rates(target.in_frame, rates, per_spring)
-        return self._over_sigma(self._values(target.in_frame, deflection)), rows / self.sigma[:, None]
+        rows = self._rates_of_values(target.in_frame, rates, per_spring)
+        return self._residuals_of(self._predicted_values(target.in_frame, deflection)), rows / self.sigma[:, None]
 
     @property
     def _deflections_per_spring(self) -> Array:
@@ -110,7 +110,8 @@ class Observation:
         """Number of the first error of a compliance: these come last, in the order of the springs."""
         return len(self.model.errors) - len(self.model.drawn.springs)
 
-    def _over_sigma(self, predicted: Array) -> Array:
+    def _residuals_of(self, predicted: Array) -> Array:
+        """Measured values less predicted ones, over the standard deviations [rows]."""
         differences = self.measured - predicted
         angles = np.arctan2(np.sin(differences), np.cos(differences))  # within half a turn
         return np.asarray(np.where(self.turns, angles, differences) / self.sigma)
@@ -149,17 +150,17 @@ class Observation:
             origin=self.frame.translation[0] + frame[3:],
         )
 
-    def _values(self, place: Motions, deflection: Array) -> Array:
+    def _predicted_values(self, place: Motions, deflection: Array) -> Array:
         """The values of all rows by the place of the target in the frame, and by the deflection of the tool [rows]."""
         angles = _angles(place.rotation)
         columns = {name: place.translation[:, i] for i, name in enumerate(POSITION)}
         columns |= {name: angles[:, i] for i, name in enumerate((*ROTATION, *EULER))}
         columns["distance"] = np.linalg.norm(place.translation - self.data.origins, axis=1)
         columns |= {f"deflection.{name}": deflection[:, i] for i, name in enumerate((*ROTATION, *POSITION))}
-        return np.array([columns[name][row] for name, row in zip(self.row_names, self.row_poses, strict=True)])
+        return np.array([columns[name][pose] for name, pose in zip(self.row_names, self.row_poses, strict=True)])
 
-    def _rates(self, place: Motions, twists: Array, per_spring: Array) -> Array:
-        """Rates of the values of all rows by the unknowns [rows x unknowns].
+    def _rates_of_values(self, place: Motions, twists: Array, per_spring: Array) -> Array:
+        """Rates of the values of all rows by the unknowns [rows x unknowns]; only columns that rows name are computed.
 
         Args:
             place: place of the target in the measuring frame.
@@ -178,7 +179,7 @@ class Observation:
         if any(name.startswith("deflection") for name in wanted):
             deflections = per_spring @ self.error_mix[self._first_spring :]
             columns |= {f"deflection.{name}": deflections[:, i] for i, name in enumerate((*ROTATION, *POSITION))}
-        return np.stack([columns[name][row] for name, row in zip(self.row_names, self.row_poses, strict=True)])
+        return np.stack([columns[name][pose] for name, pose in zip(self.row_names, self.row_poses, strict=True)])
 
 
 @dataclass(frozen=True)
@@ -290,15 +291,17 @@ def observation(
             the measuring frame is the base frame.
     """
     _check_placed(model, data)
-    numbers = {error.path: number for number, error in enumerate(model.errors)}
-    error_mix = np.zeros((len(numbers), len(unknowns)))
+    number_by_path = {error.path: number for number, error in enumerate(model.errors)}
+    error_mix = np.zeros((len(number_by_path), len(unknowns)))
     for column, unknown in enumerate(unknowns):
         for path, share in (ties or {}).get(unknown.path, {unknown.path: 1.0}).items():
-            if path in numbers:
-                error_mix[numbers[path], column] = share
-    # The rows of the residuals: pose by pose, so that the values of one pose stand together.
-    pairs = [(n, row) for n, values in data.values.items() for row in np.flatnonzero(np.isfinite(values)).tolist()]
-    pairs.sort(key=lambda pair: pair[1])
+            if path in number_by_path:  # unknowns of the frame and the target are no errors
+                error_mix[number_by_path[path], column] = share
+    # A row for each measured value, pose by pose, so that the values of one pose stand together.
+    rows = [
+        (name, pose) for name, values in data.values.items() for pose in np.flatnonzero(np.isfinite(values)).tolist()
+    ]
+    rows.sort(key=lambda name_and_pose: name_and_pose[1])
     if frame is None and any(unknown.group == "frame" for unknown in unknowns):
         frame = _estimated_frame(model, data)
     elif frame is None:
@@ -308,13 +311,13 @@ def observation(
         model=model,
         data=data,
         unknowns=tuple(unknowns),
-        error_numbers=np.array([numbers.get(unknown.path, -1) for unknown in unknowns], dtype=np.int64),
+        error_numbers=np.array([number_by_path.get(unknown.path, -1) for unknown in unknowns], dtype=np.int64),
         error_mix=error_mix,
         frame=frame,
-        row_names=tuple(name for name, _ in pairs),
-        row_poses=np.array([row for _, row in pairs], dtype=np.int64),
-        sigma=np.array([data.sigma[name][row] for name, row in pairs]),
-        measured=np.array([data.values[name][row] for name, row in pairs]),
+        row_names=tuple(name for name, _ in rows),
+        row_poses=np.array([pose for _, pose in rows], dtype=np.int64),
+        sigma=np.array([data.sigma[name][pose] for name, pose in rows]),
+        measured=np.array([data.values[name][pose] for name, pose in rows]),
     )
 
 
@@ -322,9 +325,9 @@ def _check_placed(model: ErrorModel, data: Measurements) -> None:
     """Refuse a pose at which the drawn machine has no place."""
     unplaced = np.flatnonzero(~np.isin(model.drawn.status, REGULAR))
     if unplaced.size:
-        row = int(unplaced[0])
-        sentence = Status(int(model.drawn.status[row])).sentence
-        raise data.refusal(row, f"the drawn machine is not at the commanded pose. {sentence} Check units and angles.")
+        pose = int(unplaced[0])
+        sentence = Status(int(model.drawn.status[pose])).sentence
+        raise data.refusal(pose, f"the drawn machine is not at the commanded pose. {sentence} Check units and angles.")
 
 
 def _base_frame() -> Motions:
@@ -342,10 +345,10 @@ def _estimated_frame(model: ErrorModel, data: Measurements) -> Motions:
     if not all(name in data.values for name in POSITION):
         return _base_frame()
     positions = np.stack([data.values[name] for name in POSITION], axis=1)
-    rows = np.isfinite(positions).all(axis=1)
-    if rows.sum() < 3:
+    is_measured = np.isfinite(positions).all(axis=1)
+    if is_measured.sum() < 3:
         return _base_frame()
-    measured, drawn = positions[rows], model.drawn.tool[rows]
+    measured, drawn = positions[is_measured], model.drawn.tool[is_measured]
     products = (measured - measured.mean(axis=0)).T @ (drawn - drawn.mean(axis=0))
     left, sizes, right = np.linalg.svd(products)
     if sizes[1] > ON_A_LINE * sizes[0]:
@@ -371,10 +374,10 @@ def _check_near(model: ErrorModel, data: Measurements) -> None:
     for i, name in enumerate(POSITION):
         distances = np.abs(data.values.get(name, model.drawn.tool[:, i]) - model.drawn.tool[:, i])
         if np.isfinite(distances).any() and np.nanmedian(distances) > FARTHEST_POSITION * model.length:
-            row = int(np.nanargmax(distances))
+            pose = int(np.nanargmax(distances))
             raise data.refusal(
-                row,
-                f"measured.{name} is {1e3 * data.values[name][row]:.6g} mm where the drawn machine has its tool at "
-                f"{1e3 * model.drawn.tool[row, i]:.6g} mm, and most others are as far away; check the unit in the head "
-                "of the column, or say that the measuring frame is unknown (--frame).",
+                pose,
+                f"measured.{name} is {1e3 * data.values[name][pose]:.6g} mm where the drawn machine has its tool at "
+                f"{1e3 * model.drawn.tool[pose, i]:.6g} mm, and most others are as far away; check the unit in the "
+                "head of the column, or say that the measuring frame is unknown (--frame).",
             )
