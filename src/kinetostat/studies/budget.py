@@ -369,8 +369,8 @@ def _answer(
         wanted = positive_number(allocate, "length", "allocate, the wanted error,")
         allocation = allocation_for(sums.parts, sums.effects, wanted, by, sums.leading)
     pressed = np.concatenate(sums.pressed)
-    at_any_pose = [part.path for part, is_pressed in zip(sums.parts, pressed.any(axis=0), strict=True) if is_pressed]
-    at_all_poses = [part.path for part, is_pressed in zip(sums.parts, pressed.all(axis=0), strict=True) if is_pressed]
+    at_any_pose = [part.path for part, at_poses in zip(sums.parts, pressed.T, strict=True) if at_poses.any()]
+    at_all_poses = [part.path for part, at_poses in zip(sums.parts, pressed.T, strict=True) if at_poses.all()]
     answer = Budget(
         machine=machine,
         tolerances=tuple(sums.lines.values()),

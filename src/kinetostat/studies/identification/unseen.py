@@ -74,21 +74,19 @@ def unseen_of(observed: Observation, fit: Fit, sizes: Array) -> list[Unseen]:
     basis = fit.unseen_combinations
     if not basis.shape[1]:
         return []
-    twists = observed.twists(observed.model.rates(values=observed.errors(fit.values)))
     named: list[Array] = []
-    result: list[Unseen] = []
+    with_words: list[tuple[str, Array]] = []
     for words, candidate in _common_combinations(observed, sizes, basis):
         unseen = basis @ (basis.T @ candidate)
         if np.linalg.norm(candidate - unseen) < SEEN_SHARE * np.linalg.norm(candidate) and _is_new(unseen, named):
             named.append(unseen)
-            result.append(_unseen_combination(words, candidate, observed, twists, sizes))
+            with_words.append((words, candidate))
     unnamed = basis - _projection(basis, named)
     # Strengths are near 1, or near 0 where a direction is a mix of named ones.
     directions, strengths, _ = np.linalg.svd(unnamed, full_matrices=False)
-    others = sparse(directions[:, strengths > 0.5]).T
-    return result + [
-        _unseen_combination(_sentence(other, observed), other, observed, twists, sizes) for other in others
-    ]
+    with_words += [(_sentence(other, observed), other) for other in sparse(directions[:, strengths > 0.5]).T]
+    twists = observed.twists(observed.model.rates(values=observed.errors(fit.values)))
+    return [_unseen_combination(words, each, observed, twists, sizes) for words, each in with_words]
 
 
 def _is_new(combination: Array, named: list[Array]) -> bool:
@@ -114,13 +112,13 @@ def sparse(combinations: Array) -> Array:
     Args:
         combinations: combinations as columns [unknowns x k].
     """
-    remaining, pivots = combinations.copy(), []
+    remaining, unknowns = combinations.copy(), []
     for _ in range(combinations.shape[1]):
-        sizes = np.linalg.norm(remaining, axis=1)
-        pivots.append(int(np.argmax(sizes > (1.0 - SAME_SHARE) * sizes.max())))
-        row = remaining[pivots[-1]] / sizes[pivots[-1]]
-        remaining = remaining - np.outer(remaining @ row, row)
-    return np.asarray(combinations @ np.linalg.inv(combinations[pivots]))
+        parts = np.linalg.norm(remaining, axis=1)
+        unknowns.append(int(np.argmax(parts > (1.0 - SAME_SHARE) * parts.max())))
+        direction = remaining[unknowns[-1]] / parts[unknowns[-1]]
+        remaining = remaining - np.outer(remaining @ direction, direction)
+    return np.asarray(combinations @ np.linalg.inv(combinations[unknowns]))
 
 
 def _common_combinations(observed: Observation, sizes: Array, basis: Array) -> Iterator[tuple[str, Array]]:
@@ -169,17 +167,18 @@ def _common_motions(observed: Observation, sizes: Array, at_end: bool) -> dict[i
     Base joints turn about the origin of the base, platform joints about the tool point. A motion is left out if the
     unknowns of some leg cannot make it.
     """
-    result = {}
+    motions = {}
     centre = observed.model.rows.point if at_end else np.zeros(3)
     for number, unit in enumerate(np.eye(6)):
         twist = unit + np.concatenate([np.zeros(3), np.cross(centre, unit[:3])])
-        legs = range(len(observed.model.rows.legs))
-        by_leg = [_values_of_leg(observed, leg, -twist if at_end else twist, at_end) for leg in legs]
+        # A leg whose end moves with the platform does as one whose beginning moves the other way.
+        twist = -twist if at_end else twist
+        by_leg = [_values_of_leg(observed, leg, twist, at_end) for leg in range(len(observed.model.rows.legs))]
         feasible = [values for values in by_leg if values is not None]
         together = sum(feasible, np.zeros(len(sizes)))
         if together.any() and len(feasible) == len(by_leg):
-            result[number] = together / sizes
-    return result
+            motions[number] = together / sizes
+    return motions
 
 
 def _values_of_leg(observed: Observation, leg: int, twist: Array, at_end: bool) -> Array | None:
@@ -200,9 +199,10 @@ def _values_of_leg(observed: Observation, leg: int, twist: Array, at_end: bool) 
     row, values = rows.legs[leg], np.zeros(len(observed.error_numbers))
     coordinates = random_coordinates(row, rows.length)
     motion = Insertion(leg, len(row.twists) if at_end else 0, twist)
-    goal = effects(row, rows, [[motion]], coordinates)[:, 0]
-    if np.abs(goal).max(initial=0.0) < SEEN_BY_LEG / rows.length:
+    effect = effects(row, rows, [[motion]], coordinates)[:, 0]
+    if np.abs(effect).max(initial=0.0) < SEEN_BY_LEG / rows.length:
         return values
+    # Compliances have numbers behind those of the sources; ties, the frame and the target have -1.
     numbers = {n: number for n, number in enumerate(observed.error_numbers) if 0 <= number < len(sources)}
     insertions = {n: sources[number].insertions for n, number in numbers.items()}
     of_leg = {n: group for n, group in insertions.items() if {insertion.leg for insertion in group} == {leg}}
@@ -210,8 +210,8 @@ def _values_of_leg(observed: Observation, leg: int, twist: Array, at_end: bool) 
         return None
     columns = effects(row, rows, [*of_leg.values()], coordinates)
     scale = np.linalg.norm(columns, axis=0)
-    amounts, *_ = np.linalg.lstsq(columns / scale, goal, rcond=SEEN_BY_LEG)
-    if np.linalg.norm(columns / scale @ amounts - goal) > SAME_EFFECT * np.linalg.norm(goal):
+    amounts, *_ = np.linalg.lstsq(columns / scale, effect, rcond=SEEN_BY_LEG)
+    if np.linalg.norm(columns / scale @ amounts - effect) > SAME_EFFECT * np.linalg.norm(effect):
         return None
     values[[*of_leg]] = amounts / scale
     return values
@@ -227,11 +227,12 @@ def _place_motions(observed: Observation, sizes: Array, paths: tuple[str, ...]) 
 def _sentence(combination: Array, observed: Observation) -> str:
     """Name the largest parts of a combination."""
     shares = combination / np.abs(combination).max()
-    order = [int(i) for i in np.argsort(-np.abs(combination)) if abs(shares[i]) > LEAST_NAMED_PART]
-    parts = [f"{shares[i]:+.2g} × {observed.unknowns[i].words}" for i in order[:MOST_NAMED_PARTS]]
-    if len(order) == 1:
-        return f"The {observed.unknowns[order[0]].words} changes nothing that was measured."
-    more = f" and {len(order) - MOST_NAMED_PARTS} more" if len(order) > MOST_NAMED_PARTS else ""
+    largest_first = [int(i) for i in np.argsort(-np.abs(combination)) if abs(shares[i]) > LEAST_NAMED_PART]
+    if len(largest_first) == 1:
+        return f"The {observed.unknowns[largest_first[0]].words} changes nothing that was measured."
+    parts = [f"{shares[i]:+.2g} × {observed.unknowns[i].words}" for i in largest_first[:MOST_NAMED_PARTS]]
+    others = len(largest_first) - MOST_NAMED_PARTS
+    more = f" and {others} more" if others > 0 else ""
     return f"Only other combinations than this one are seen: {', '.join(parts)}{more}."
 
 
