@@ -21,7 +21,8 @@ from kinetostat.arrays import Array, Codes
 from kinetostat.engine.trace import Body, Condition, Node, Operand, Traced, needed_nodes, rows_of
 
 TURN_OPERATION = "turn"
-"""Operation of a cosine or sine as derivatives see it; its operands are the angle and the derivative by it."""
+"""Operation of a cosine or sine as derivatives see it; its operands are the angle and the derivative by it. A graph
+has no such operation: it computes cosines and sines by arithmetic, see `Graph.turns`."""
 
 
 def with_gradients(body: Body, inputs: Sequence[Traced]) -> Body:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
 from functools import lru_cache, partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -90,9 +91,9 @@ def way_of(machine: Machine, paths: Sequence[str], quantities: Sequence[str], co
     if not loaded and count < COLUMNS_TO and platform_alone(machine, paths):
         return Way.COLUMNS
     native = count >= NATIVE_FROM and have_programs(machine, tuple(paths), quantities)
-    if native and count < NATIVE_FROM_WITH_LEGS * _programs_with_legs(machine, tuple(paths), quantities):
-        native = False
-    return Way.NATIVE if native else Way.ANY_MACHINE if loaded else Way.MODES
+    if native and count >= NATIVE_FROM_WITH_LEGS * _programs_with_legs(machine, tuple(paths), quantities):
+        return Way.NATIVE
+    return Way.ANY_MACHINE if loaded else Way.MODES
 
 
 def _programs_with_legs(machine: Machine, paths: tuple[str, ...], quantities: Sequence[str]) -> int:
@@ -221,6 +222,20 @@ def _response_with_states(
     return response
 
 
+class _ModalRows(NamedTuple):
+    """Numbers that follow from modes, and the rows of a slab's results that they become.
+
+    Attributes:
+        numbers: the numbers.
+        result_rows: rows of the results.
+        value_rows: for each of these rows, that of the numbers.
+    """
+
+    numbers: ModalNumbers
+    result_rows: list[int]
+    value_rows: list[int]
+
+
 class ModalFill:
     """The fill of quantities of which some follow from modes over springs, as legs with masses that close loops have.
 
@@ -237,16 +252,18 @@ class ModalFill:
         needing = [name for name in quantities if counts.needed_by(QUANTITIES[name])]
         others = [name for name in quantities if name not in needing]
         if not others or (counts.at_rest and not rest_numbers(machine, others)):
-            others.append("displacement_x" if counts.at_rest else "singularity_margin")  # whatever gives the status
+            others.append("displacement_x" if counts.at_rest else "singularity_margin")  # any that gives the status
         self._machine, self._count, self._closed = machine, len(others), closes_inside(machine)
         self._others = _fill_of_legs(machine, paths, others)
-        self._places = [(quantities.index(name), others.index(name)) for name in quantities if name not in needing]
-        self._modal: list[tuple[ModalNumbers, list[int], list[int]]] = []
-        for what, rows in rows_of_modes(needing).items():
-            count = max(rows.values())
+        without_modes = [name for name in quantities if name not in needing]
+        self._result_rows = [quantities.index(name) for name in without_modes]
+        self._rows_of_others = [others.index(name) for name in without_modes]
+        self._modal: list[_ModalRows] = []
+        for what, mode_numbers in rows_of_modes(needing).items():
+            count = max(mode_numbers.values())
             numbers = ModalNumbers(machine, self._others.form, self._closed, what, count)
-            places = [quantities.index(name) for name in rows]
-            self._modal.append((numbers, places, [number - 1 for number in rows.values()]))
+            result_rows = [quantities.index(name) for name in mode_numbers]
+            self._modal.append(_ModalRows(numbers, result_rows, [number - 1 for number in mode_numbers.values()]))
 
     def __call__(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Evaluate a slab, see `Fill`."""
@@ -258,11 +275,10 @@ class ModalFill:
             self._others.solve(program_inputs, others, status, *states)
         else:
             self._others.program.run(fixed, program_inputs, others, status)
-        for place, row in self._places:
-            results[place] = others[row]
-        for numbers, places, rows in self._modal:
+        results[self._result_rows] = others[self._rows_of_others]
+        for numbers, result_rows, value_rows in self._modal:
             values, sure = numbers.at(fixed, [*program_inputs, *states] if numbers.at_rest else program_inputs)
-            results[places] = values[rows]
+            results[result_rows] = values[value_rows]
             status[~sure & (status == Status.OK)] = Status.NOT_CONVERGED
         results[:, status != Status.OK] = np.nan
 
@@ -289,5 +305,5 @@ def have_programs(machine: Machine, paths: tuple[str, ...], quantities: Sequence
         at_rest = alone or _mode_counts(machine, paths, tuple(quantities)) is not None
     elif machine_cut is not None and "frequency" in needed:
         at_rest = not leaves_plane(machine, machine_cut)
-    rings = not any(q.modal and not q.loaded for q in wanted) or _reducible(machine, paths)
-    return at_rest and (rings or _mode_counts(machine, paths, tuple(quantities)) is not None)
+    free_modes = not any(q.modal and not q.loaded for q in wanted) or _reducible(machine, paths)
+    return at_rest and (free_modes or _mode_counts(machine, paths, tuple(quantities)) is not None)

@@ -8,6 +8,7 @@ Source: Golub and Van Loan, Matrix Computations, section 8.4.
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from kinetostat.engine.llvm_source import LoopCode, Value
 from kinetostat.frozen import dataclass
@@ -120,49 +121,72 @@ def _enclosed_shares(code: LoopCode, matrix: Tridiagonal, count: int) -> list[Va
     return turn.values[:count]
 
 
+class SturmSequence(NamedTuple):
+    """A Sturm sequence after some rows, scaled by a positive number.
+
+    Attributes:
+        last, before_last: its last two terms.
+        equal_signs: number of neighbours of equal sign so far, which is the number of eigenvalues above.
+    """
+
+    last: Value
+    before_last: Value
+    equal_signs: Value
+
+
 def _counts_above(code: LoopCode, numbers: Sequence[Value], matrix: Tridiagonal) -> list[Value]:
     """Count the eigenvalues of a matrix above each of some numbers, by the signs in Sturm sequences."""
-    zero, unit = code.number(0.0), code.number(1.0)
     parts, remaining_rows = divmod(matrix.size, ROWS_BETWEEN_SCALINGS)
     end = parts * ROWS_BETWEEN_SCALINGS
-    first_values = [value for _ in numbers for value in (unit, zero, zero)]
-    with code.loop(0, end, first_values, ROWS_BETWEEN_SCALINGS) as loop:
-        loop.after = _sequences(code, numbers, loop.values, matrix, loop.index, ROWS_BETWEEN_SCALINGS)
-    return _sequences(code, numbers, loop.values, matrix, str(end), remaining_rows)[2::3]
+    start = SturmSequence(last=code.number(1.0), before_last=code.number(0.0), equal_signs=code.number(0.0))
+    with code.loop(0, end, [*start] * len(numbers), ROWS_BETWEEN_SCALINGS) as loop:
+        continued = _continued(code, numbers, _sequences_of(loop.values), matrix, loop.index, ROWS_BETWEEN_SCALINGS)
+        loop.after = [value for sequence in continued for value in sequence]
+    whole = _continued(code, numbers, _sequences_of(loop.values), matrix, str(end), remaining_rows)
+    return [sequence.equal_signs for sequence in whole]
 
 
-def _sequences(
-    code: LoopCode, numbers: Sequence[Value], values: Sequence[Value], matrix: Tridiagonal, first: Value, rows: int
-) -> list[Value]:
+def _sequences_of(values: Sequence[Value]) -> list[SturmSequence]:
+    """Take sequences off the values that a loop carries."""
+    size = len(SturmSequence._fields)
+    return [SturmSequence(*values[first : first + size]) for first in range(0, len(values), size)]
+
+
+def _continued(
+    code: LoopCode,
+    numbers: Sequence[Value],
+    sequences: Sequence[SturmSequence],
+    matrix: Tridiagonal,
+    first: Value,
+    rows: int,
+) -> list[SturmSequence]:
     """Continue Sturm sequences p_i = (d_i - x) p_(i-1) - e_i^2 p_(i-2) by some rows, and scale them.
 
     Args:
         code: to which lines are appended.
         numbers: the number x of each sequence.
-        values: the last two terms of each sequence, the last one first, and its number of neighbours of equal sign.
+        sequences: the sequences before these rows.
         matrix: the matrix with diagonal d and entries e beside it.
         first: the first row.
         rows: number of rows.
-
-    Returns:
-        The values after these rows.
     """
-    result = list(values)
-    signs = [code.append_sign(code.integer(0), values[3 * k]) for k in range(len(numbers))]
+    terms = [(sequence.last, sequence.before_last) for sequence in sequences]
+    signs = [code.append_sign(code.integer(0), sequence.last) for sequence in sequences]
     for row in range(rows):
         place = code.index("add", first, row)
         entry, square = (code.load(start, place) for start in (matrix.diagonal, matrix.squares))
         for k, number in enumerate(numbers):
-            last, before_last = result[3 * k : 3 * k + 2]
+            last, before_last = terms[k]
             subtracted = code.mul(square, before_last)
             term = code.sub(code.mul(code.sub(entry, number), last), subtracted)
             signs[k] = code.append_sign(signs[k], term)
-            result[3 * k : 3 * k + 2] = term, last
+            terms[k] = term, last
     small, scale_up, unit = (code.number(value) for value in (SMALL_SEQUENCE, 1.0 / SMALL_SEQUENCE, 1.0))
-    for k in range(len(numbers)):
-        last, before_last, count = result[3 * k : 3 * k + 3]
-        equal_signs = code.sub(code.number(float(rows)), code.count_sign_changes(signs[k], rows))
+    result = []
+    for (last, before_last), sign_row, sequence in zip(terms, signs, sequences, strict=True):
+        equal_signs = code.sub(code.number(float(rows)), code.count_sign_changes(sign_row, rows))
         size = code.add(code.call("abs", last), code.call("abs", before_last))
         scale = code.where(code.is_less(size, small), scale_up, unit)
-        result[3 * k : 3 * k + 3] = code.mul(last, scale), code.mul(before_last, scale), code.add(count, equal_signs)
+        scaled = code.mul(last, scale), code.mul(before_last, scale)
+        result.append(SturmSequence(*scaled, code.add(sequence.equal_signs, equal_signs)))
     return result
