@@ -413,8 +413,8 @@ def total_slopes(slopes: Array, by_joints: Array, joint_rates: Array, rates: Arr
     left, sizes, right = np.linalg.svd(joint_rates[sound], full_matrices=False)
     kept = sizes > IDLE_COORDINATES * sizes[:, :1]
     inverse = np.divide(1.0, sizes, where=kept, out=np.zeros_like(sizes))
-    work = np.swapaxes(left, 1, 2) @ rates[sound]
-    motion = -np.swapaxes(right, 1, 2) @ (inverse[:, :, None] * work)
+    work = left.mT @ rates[sound]
+    motion = -right.mT @ (inverse[:, :, None] * work)
     # What remains of an equation shows that the joints cannot follow this parameter: a leg would open.
     remaining = np.abs(rates[sound] + joint_rates[sound] @ motion).max(axis=1, initial=0.0)
     largest = np.abs(rates[sound]).max(axis=(1, 2), initial=0.0)

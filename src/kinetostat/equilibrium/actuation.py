@@ -106,8 +106,8 @@ def _tensions_of_cables(mechanism: Mechanism, least: Array, most: Array, rule: R
     """Loads of all coordinates of cables at n poses [n x coordinates], and where there are any within bounds [n]."""
     wrenches = []
     for leg in mechanism.legs:  # that which does no work on its passive motions, and as much as it pulls on its own
-        motions = mechanism.ways.T @ np.swapaxes(leg.chain.twists, 1, 2) @ leg.chain.follows
-        wrenches.append(_solution_or_nan(np.swapaxes(motions, 1, 2), leg.sign))
+        motions = mechanism.ways.T @ leg.chain.twists.mT @ leg.chain.follows
+        wrenches.append(_solution_or_nan(motions.mT, leg.sign))
     load = platform_load(mechanism, free_state(mechanism).platform)[0] @ mechanism.ways
     tensions, exist = distribution(np.stack(wrenches, axis=2), load, least, most, rule)
     parts = [tensions[:, [place]] * leg.sign for place, leg in enumerate(mechanism.legs)]

@@ -152,7 +152,7 @@ def leg_terms(
     return LegTerms(
         end=placed.end,
         rates=leg.chain.rates(placed),
-        driven=np.swapaxes(screws, 1, 2) @ drives,
+        driven=screws.mT @ drives,
         loads=loads,
         holding=(work - weight) @ drives,
         carrying=stiffness,
@@ -173,7 +173,7 @@ def _change(screws: Array, turning: Array, pulling: Array) -> Array:
         pulling: the vectors of `_weight`, by which its gradient changes [n x motions x 3].
     """
     weighing = np.tril(np.einsum("njc,nkc->nkj", screws[..., :3], pulling))
-    change = -weighing - np.swapaxes(np.tril(weighing, -1), 1, 2)
+    change = -weighing - np.tril(weighing, -1).mT
     return np.asarray(change - np.tril(np.einsum("njc,nkc->nkj", screws, turning), -1))
 
 
@@ -183,7 +183,7 @@ def _symmetric_change(screws: Array, turning: Array, pulling: Array) -> Array:
     by_motion[..., :3] += pulling
     below = np.tril(-np.einsum("njc,nkc->nkj", screws, by_motion), -1)
     diagonal = np.einsum("nkc,nkc->nk", screws[..., :3], pulling)[:, :, None] * np.eye(screws.shape[1])
-    return np.asarray(below + np.swapaxes(below, 1, 2) - diagonal)
+    return np.asarray(below + below.mT - diagonal)
 
 
 def _weight(leg: ElasticLeg, placed: Sequence[Motions], screws: Array, gravity: Array) -> tuple[Array, Array]:
@@ -294,9 +294,9 @@ class Balance:
         leg, terms, ways = self.mechanism.legs[number], self.legs[number], self.mechanism.ways
         across = ways.T @ terms.rates
         result = np.zeros((len(across), leg.size + ways.shape[1], leg.size + ways.shape[1]))
-        inner = terms.carrying[:, :, None] * np.eye(leg.size) + leg.idle @ np.swapaxes(leg.idle, 1, 2)
+        inner = terms.carrying[:, :, None] * np.eye(leg.size) + leg.idle @ leg.idle.mT
         result[:, : leg.size, : leg.size] = inner + terms.geometric if loaded else inner
-        result[:, : leg.size, leg.size :] = -np.swapaxes(across, 1, 2)
+        result[:, : leg.size, leg.size :] = -across.mT
         result[:, leg.size :, : leg.size] = across
         return result
 

@@ -129,7 +129,7 @@ def _step_within(mechanism: Mechanism, state: State, radius: Array) -> _Step:
     balancing = np.zeros_like(equations.residual)
     for part in parts:
         residual = equations.residual[part.rows][:, moving, None]
-        balancing[part.rows[:, None], carried] = (np.swapaxes(part.closing_inverse, 1, 2) @ residual)[:, :, 0]
+        balancing[part.rows[:, None], carried] = (part.closing_inverse.mT @ residual)[:, :, 0]
     equations = balance(mechanism, state_after(mechanism, state, balancing))
     matrices = tangent_matrices(equations)
     unknowns = np.zeros_like(balancing)
@@ -208,7 +208,7 @@ def _model(equations: Balance, matrices: TangentMatrices, part: Admissible) -> _
             lines.append(leg.sign[i] * part.motions[:, place])
             elastic[:, place, place] = 0.0
             residual[:, place] -= leg.sign[i] * np.maximum(loads[-1], 0.0)
-    force = -(np.swapaxes(part.motions, 1, 2) @ residual[:, :, None])[:, :, 0]
+    force = -(part.motions.mT @ residual[:, :, None])[:, :, 0]
     columns = [np.stack(column, axis=1) for column in (lines, loads, springs) if column]
     nothing = np.zeros((len(part.rows), 0))
     no_springs = (np.zeros((len(part.rows), 0, part.motions.shape[2])), nothing, nothing)

@@ -280,5 +280,5 @@ def idle_motions(rates: Array, springs: Sequence[Spring | None]) -> Array:
     all_sizes = np.zeros((len(rates), len(passive)))
     all_sizes[:, : sizes.shape[1]] = sizes
     idle = motions * (all_sizes < DEPENDENT)[:, :, None]
-    result[:, passive, : len(passive)] = np.swapaxes(idle, 1, 2)
+    result[:, passive, : len(passive)] = idle.mT
     return result

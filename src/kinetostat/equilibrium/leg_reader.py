@@ -300,7 +300,7 @@ def elastic_leg(
     chain = Chain(twists, tuple(row.coordinate), tuple(row.given), size)
     idle = np.zeros((count, size, size))
     if units.count is not None:
-        idle = idle_motions(np.swapaxes(twists, 1, 2) @ chain.follows, row.springs)
+        idle = idle_motions(twists.mT @ chain.follows, row.springs)
     return ElasticLeg(
         name=leg.name,
         chain=chain,

@@ -291,7 +291,7 @@ def stabilities(equations: Balance) -> Stabilities:
         holds = holds_all(springs)
         whitening = np.linalg.inv(np.where(holds[:, None, None], springs, np.eye(springs.shape[1])))
         # K_e + factor K_g is singular at factor = 1/share, so that the largest share decides.
-        shares, vectors = np.linalg.eigh(-np.swapaxes(whitening, 1, 2) @ turning @ whitening)
+        shares, vectors = np.linalg.eigh(-whitening.mT @ turning @ whitening)
         # Where springs hold every motion, those much softer than others would be lost in the sum of both matrices.
         stable[rows] = np.where(holds, shares[:, -1] < 1.0, np.linalg.eigvalsh(stiff + turning)[:, 0] > 0.0)
         grows = holds & (shares[:, -1] > UNRESISTED)

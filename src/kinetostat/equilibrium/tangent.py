@@ -55,7 +55,7 @@ def tangent_matrices(equations: Balance) -> TangentMatrices:
     geometric[:, places.platform, places.platform] = -ways.T @ equations.load_change @ ways
     for number, (leg, terms, moving) in enumerate(zip(mechanism.legs, equations.legs, places.coordinates, strict=True)):
         springs = terms.carrying[:, :, None] * np.eye(leg.size)
-        elastic[:, moving, moving] = springs + leg.idle @ np.swapaxes(leg.idle, 1, 2)
+        elastic[:, moving, moving] = springs + leg.idle @ leg.idle.mT
         geometric[:, moving, moving] = terms.geometric
         conditions = conditions_of_leg(number, size)
         closing[:, conditions, moving] = ways.T @ terms.rates
@@ -117,8 +117,8 @@ def admissible(equations: Balance, closing: Array, rows: Integers | None = None)
     for rank in np.unique(ranks):
         of_rank = ranks == rank
         shrink = 1.0 / sizes[of_rank, None, :rank]
-        inverse = np.swapaxes(right[of_rank, :rank], 1, 2) * shrink @ np.swapaxes(left[of_rank, :, :rank], 1, 2)
-        yield Admissible(rows[of_rank], np.swapaxes(right[of_rank, rank:], 1, 2), inverse)
+        inverse = right[of_rank, :rank].mT * shrink @ left[of_rank, :, :rank].mT
+        yield Admissible(rows[of_rank], right[of_rank, rank:].mT, inverse)
 
 
 def _motions_of_platform(equations: Balance, closing: Array, rows: Integers) -> Admissible | None:
@@ -145,7 +145,7 @@ def _motions_of_platform(equations: Balance, closing: Array, rows: Integers) -> 
 
 def over_motions(matrix: Array, allowed: Array) -> Array:
     """Return the symmetric part of Z^T M Z, the matrix M over the motions in the columns of Z [n x k x k]."""
-    return np.asarray(0.5 * np.swapaxes(allowed, 1, 2) @ (matrix + np.swapaxes(matrix, 1, 2)) @ allowed)
+    return np.asarray(0.5 * allowed.mT @ (matrix + matrix.mT) @ allowed)
 
 
 def solve_at_rest(equations: Balance, right: Array, loaded: bool = True) -> Array:
@@ -274,12 +274,11 @@ def solve_over_admissible(equations: Balance, right: Array, loaded: bool) -> Arr
     for part in admissible(equations, closing, sound):
         tangent = elastic[part.rows] + geometric[part.rows]
         motion = part.closing_inverse @ gap[part.rows]
-        transposed = np.swapaxes(part.motions, 1, 2)
         if part.motions.shape[2]:
-            remaining = transposed @ (force[part.rows] - tangent @ motion)
-            turning = transposed @ geometric[part.rows] @ part.motions
+            remaining = part.motions.mT @ (force[part.rows] - tangent @ motion)
+            turning = part.motions.mT @ geometric[part.rows] @ part.motions
             motion = motion + part.motions @ _balanced_motion(spring_factor(equations, part), turning, remaining)
-        wrenches = np.swapaxes(part.closing_inverse, 1, 2) @ (tangent @ motion - force[part.rows])
+        wrenches = part.closing_inverse.mT @ (tangent @ motion - force[part.rows])
         result[part.rows[:, None], moving], result[part.rows[:, None], carried] = motion, wrenches
     return result
 
@@ -297,7 +296,7 @@ def spring_factor(equations: Balance, part: Admissible) -> Array:
     order = np.argsort(-roots, axis=1, kind="stable")
     blocks = [np.take_along_axis(stretched, order[:, :, None], axis=1)]
     for leg, moving in zip(equations.mechanism.legs, places.coordinates, strict=True):
-        blocks.append(np.swapaxes(leg.idle[part.rows], 1, 2) @ part.motions[:, moving])
+        blocks.append(leg.idle[part.rows].mT @ part.motions[:, moving])
     missing = part.motions.shape[2] - sum(block.shape[1] for block in blocks)
     blocks.append(np.zeros((len(part.rows), max(missing, 0), part.motions.shape[2])))
     return np.asarray(np.linalg.qr(np.concatenate(blocks, axis=1), mode="r"))
@@ -315,11 +314,10 @@ def _balanced_motion(springs: Array, turning: Array, force: Array) -> Array:
     result = np.zeros_like(force)
     if holds.any():
         inverse = np.linalg.inv(springs[holds])
-        transposed = np.swapaxes(inverse, 1, 2)
-        scaled = np.eye(springs.shape[1]) + transposed @ turning[holds] @ inverse
-        result[holds] = inverse @ finite_solution(scaled, transposed @ force[holds])
+        scaled = np.eye(springs.shape[1]) + inverse.mT @ turning[holds] @ inverse
+        result[holds] = inverse @ finite_solution(scaled, inverse.mT @ force[holds])
     if not holds.all():
-        tangent = np.swapaxes(springs[~holds], 1, 2) @ springs[~holds] + turning[~holds]
+        tangent = springs[~holds].mT @ springs[~holds] + turning[~holds]
         result[~holds] = finite_solution(tangent, force[~holds])
     return result
 
@@ -335,8 +333,8 @@ def platform_compliance(equations: Balance) -> Array:
     right[:, :size] = np.eye(size)
     twists = ways @ solve_at_rest(equations, right)[:, :size] @ ways.T
     shift = _shift(-skew_of(equations.state.platform.translation))
-    twists = shift @ twists @ np.swapaxes(shift, 1, 2)
-    twists = 0.5 * (twists + np.swapaxes(twists, 1, 2))
+    twists = shift @ twists @ shift.mT
+    twists = 0.5 * (twists + twists.mT)
     sizes = np.abs(np.diagonal(twists, axis1=1, axis2=2))
     # In these units a typical spring has the compliance 1.
     moves = sizes > ROUND_OFF_OF_COMPLIANCE * np.maximum(sizes.sum(axis=1, keepdims=True), 1.0)
@@ -392,8 +390,8 @@ def elastic_stiffness(equations: Balance, compliances: Array) -> Array:
         # Wrenches that no joint feels make these singular: the pseudo-inverse leaves out what rigid parts hold.
         sum_of_legs += np.linalg.pinv(rates)[:, leg.size :, leg.size :]
     from_tool = _shift(skew_of(equations.state.platform.translation))
-    stiffness = np.swapaxes(from_tool, 1, 2) @ ways @ sum_of_legs @ ways.T @ from_tool
-    stiffness = 0.5 * (stiffness + np.swapaxes(stiffness, 1, 2))
+    stiffness = from_tool.mT @ ways @ sum_of_legs @ ways.T @ from_tool
+    stiffness = 0.5 * (stiffness + stiffness.mT)
     exists = np.abs(ways).max(axis=1) > 0.0
     fixed = (np.diagonal(compliances, axis1=1, axis2=2) == 0.0) & exists
     separable = np.isfinite(stiffness_of(compliances[:, exists][:, :, exists])).any(axis=(1, 2))

@@ -45,7 +45,7 @@ def tensor_of(masses: Masses, number: int, motion: Motions) -> Array | None:
     if _are_zero(entries):
         return None
     rows = np.stack([entries[:, list(row)] for row in TENSOR_ROWS], axis=1)
-    return np.asarray(motion.rotation @ rows @ np.swapaxes(motion.rotation, 1, 2))
+    return np.asarray(motion.rotation @ rows @ motion.rotation.mT)
 
 
 def _are_zero(entries: Array) -> bool:
@@ -63,7 +63,7 @@ def leg_rates(leg: ElasticLeg, placed: PlacedChain) -> list[PartRates]:
         carrier, screws = placed.before[motions], placed.screws[:, :motions]
         point = carrier.point(leg.masses.point[:, number])
         velocities = cross(screws[..., :3], point[:, None]) + screws[..., 3:]
-        velocity, angular = (np.swapaxes(part, 1, 2) @ follows[:motions] for part in (velocities, screws[..., :3]))
+        velocity, angular = (part.mT @ follows[:motions] for part in (velocities, screws[..., :3]))
         rates.append(PartRates(velocity, angular, tensor_of(leg.masses, number, carrier)))
     return rates
 
@@ -92,15 +92,15 @@ def mass_matrices(masses: Masses, rates: Sequence[PartRates], length: Array) -> 
         The name of a part, and its matrix [n x coordinates x coordinates].
     """
     for name, part, uncoupled in zip(masses.names, rates, (masses.uncoupled * length[:, None]).T, strict=True):
-        matrix = np.swapaxes(part.velocity, 1, 2) @ part.velocity * uncoupled[:, None, None]
+        matrix = part.velocity.mT @ part.velocity * uncoupled[:, None, None]
         if part.tensor is not None:
-            rotary = np.swapaxes(part.angular, 1, 2) @ part.tensor @ part.angular
+            rotary = part.angular.mT @ part.tensor @ part.angular
             matrix = matrix + rotary * length[:, None, None]
         yield name, matrix
     coupled = (masses.mass - masses.uncoupled) * length[:, None]
     for first, second in masses.pairs:
-        product = np.swapaxes(rates[first].velocity, 1, 2) @ rates[second].velocity
-        yield masses.names[first], (product + np.swapaxes(product, 1, 2)) * coupled[:, first, None, None]
+        product = rates[first].velocity.mT @ rates[second].velocity
+        yield masses.names[first], (product + product.mT) * coupled[:, first, None, None]
 
 
 def energy_of(masses: Masses, rates: Sequence[PartRates], motion: Array, length: Array) -> Scalar:

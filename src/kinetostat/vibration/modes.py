@@ -100,7 +100,7 @@ def stiffness_matrix(equations: Balance) -> tuple[Array, Array]:
     mechanism, matrices = equations.mechanism, tangent_matrices(equations)
     stiff = matrices.elastic + matrices.geometric
     for leg, moving in zip(mechanism.legs, mechanism.motion_places.coordinates, strict=True):
-        stiff[:, moving, moving] -= leg.idle @ np.swapaxes(leg.idle, 1, 2)
+        stiff[:, moving, moving] -= leg.idle @ leg.idle.mT
     return stiff, matrices.closing
 
 
@@ -151,15 +151,14 @@ def solved_modes(equations: Balance, shaped: bool = True) -> Iterator[ModesOfPos
         holds, factors = _inverse_factors(stiff_within)
         if not holds.any():
             continue
-        transposed = np.swapaxes(factors, 1, 2)
-        scaled_mass = factors @ mass_within[holds] @ transposed
+        scaled_mass = factors @ mass_within[holds] @ factors.mT
         if shaped:
             inverse_squares, axes = np.linalg.eigh(scaled_mass)
-            shapes = _over_coordinates(transposed @ axes[:, :, ::-1], [part[holds] for part in basis])
+            shapes = _over_coordinates(factors.mT @ axes[:, :, ::-1], [part[holds] for part in basis])
         else:
             inverse_squares, shapes = np.linalg.eigvalsh(scaled_mass), np.zeros((int(holds.sum()), places.count, 0))
         inverse_squares = inverse_squares[:, ::-1]
-        motion_sizes = np.trace(factors @ unit_within[holds] @ transposed, axis1=1, axis2=2)
+        motion_sizes = np.trace(factors @ unit_within[holds] @ factors.mT, axis1=1, axis2=2)
         round_off = NO_MOMENTUM * np.trace(mass[rows[holds]], axis1=1, axis2=2) * motion_sizes
         has_mass = inverse_squares > np.maximum(UNRESISTED * inverse_squares[:, :1], round_off[:, None])
         inverse_squares = np.where(has_mass, inverse_squares, 0.0)
@@ -193,9 +192,9 @@ def _allowed_motions(
     ranks = np.stack([(sizes > CLOSING_ROUND_OFF).sum(axis=1), *(leg.rank for leg in legs)], axis=1)
     for platform_rank, *leg_ranks in np.unique(ranks, axis=0):
         of_ranks = (ranks == [platform_rank, *leg_ranks]).all(axis=1)
-        platform = np.swapaxes(ways[of_ranks, platform_rank:], 1, 2)
+        platform = ways[of_ranks, platform_rank:].mT
         motions = [
-            np.concatenate([leg.inverse[of_ranks] @ platform, np.swapaxes(leg.motions[of_ranks, rank:], 1, 2)], axis=2)
+            np.concatenate([leg.inverse[of_ranks] @ platform, leg.motions[of_ranks, rank:].mT], axis=2)
             for leg, rank in zip(legs, leg_ranks, strict=True)
         ]
         yield rows[of_ranks], [platform, *motions]
@@ -233,8 +232,8 @@ def _closed_leg(closing: Array, idle: Array) -> _ClosedLeg:
     counts = np.arange(count) < rank[:, None]
     reciprocals = np.divide(1.0, sizes, where=counts, out=np.zeros_like(sizes))
     reached = left[:, :, :count] * counts[:, None]
-    by_twist = np.swapaxes(reached, 1, 2)[:, :, :size]
-    inverse = np.swapaxes(right[:, :count], 1, 2) * reciprocals[:, None] @ by_twist
+    by_twist = reached.mT[:, :, :size]
+    inverse = right[:, :count].mT * reciprocals[:, None] @ by_twist
     missed = np.eye(reached.shape[1])[:, :size] - reached @ by_twist
     return _ClosedLeg(inverse, missed, rank, right)
 
@@ -307,9 +306,8 @@ def _without_momentum(idle: Array, mass: Array) -> Array:
     Along idle motions that have no mass there is no momentum; their rows leave out these motions themselves, U^T y.
     Rows of momentum have unit length, as those of motions.
     """
-    transposed = np.swapaxes(idle, 1, 2)
-    masses, axes = np.linalg.eigh(np.nan_to_num(transposed @ mass @ idle))  # poses out of reach have no numbers
-    motions = np.swapaxes(axes, 1, 2) @ transposed
+    masses, axes = np.linalg.eigh(np.nan_to_num(idle.mT @ mass @ idle))  # poses out of reach have no numbers
+    motions = axes.mT @ idle.mT
     has_mass = masses > UNRESISTED * np.trace(mass, axis1=1, axis2=2)[:, None]
     momenta = motions @ mass
     sizes = np.where(has_mass, np.linalg.norm(momenta, axis=2), 1.0)

@@ -134,7 +134,7 @@ def couple(machine: Complex, tool: FreeTool, frequencies: Array) -> Complex:
     others = [part for part in range(6) if part not in tip]
     # Apart, each unit wrench moves the flange of the tool, or that of the machine: forces between both close this gap.
     gaps = np.zeros((len(frequencies), len(flange), 6), dtype=complex)
-    gaps[:, :, tip] = np.swapaxes(across, 1, 2)
+    gaps[:, :, tip] = across.mT
     gaps[:, :, others] = -machine[:, flange][:, :, others]
     forces = np.linalg.solve(at_flange + machine[:, flange][:, :, flange], gaps)
     result = np.zeros((len(frequencies), 6, 6), dtype=complex)

@@ -271,10 +271,10 @@ def mode_columns(machine: Machine, count: int, most: int) -> list[Array]:
         inverse_squares, shapes = part.inverse_squares[:, :known], part.shapes[:, :, :known]
         # Along allowed motions mu K y = M y; across them, the forces of the constraints balance the difference.
         imbalance = stiff[part.rows] @ shapes * inverse_squares[:, None] - mass[part.rows] @ shapes
-        forces = np.linalg.pinv(np.swapaxes(constraints[part.rows], 1, 2), rcond=CLOSING_ROUND_OFF) @ imbalance
+        forces = np.linalg.pinv(constraints[part.rows].mT, rcond=CLOSING_ROUND_OFF) @ imbalance
         numbers = np.concatenate([inverse_squares[:, None], shapes, forces[:, :closing_count]], axis=1)
         columns[part.rows] = 0.0
-        columns[part.rows, :known] = np.swapaxes(numbers, 1, 2)
+        columns[part.rows, :known] = numbers.mT
     return [equations.mechanism.force, *np.ascontiguousarray(columns.reshape(count, -1).T)]
 
 

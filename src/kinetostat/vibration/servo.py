@@ -161,7 +161,7 @@ class ClosedLoops:
         rigid = ~np.isfinite(change)
         weight, unit = np.where(rigid, 1.0, change), np.where(rigid, 0.0, 1.0)
         system = unit[:, :, None] * np.eye(len(self.loops)) + weight[:, :, None] * drives
-        solved = np.linalg.solve(system, weight[:, :, None] * np.swapaxes(across, 1, 2))
+        solved = np.linalg.solve(system, weight[:, :, None] * across.mT)
         return np.asarray(tool - across @ solved)
 
     @property

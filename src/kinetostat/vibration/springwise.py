@@ -80,8 +80,8 @@ class SpringSizes:
         projection = np.eye(self.springs) - inverse.reshape(len(inverse), self.springs, -1) @ conditions
         projected = []
         for mixed, triangle in ((mixed_mass, mass), (mixed_stiffness, stiffness)):
-            product_with_twists = np.swapaxes(twists, 1, 2) @ mixed
-            whole = product_with_twists + np.swapaxes(product_with_twists, 1, 2) + self._from_upper(triangle)
+            product_with_twists = twists.mT @ mixed
+            whole = product_with_twists + product_with_twists.mT + self._from_upper(triangle)
             projected.append(projection @ whole @ projection)
         return projection, projected[0], projected[1]
 
@@ -111,11 +111,11 @@ class SpringSizes:
         rows, sizes, axes = finite[stable], sizes[stable], axes[stable]
         # In the coordinates of these factors the stiffness is 1, so that an ordinary eigenvalue problem is left.
         factors = axes / np.sqrt(sizes)[:, None]
-        reduced = np.swapaxes(factors, 1, 2) @ (mass if massive else projection)[rows] @ factors
+        reduced = factors.mT @ (mass if massive else projection)[rows] @ factors
         shapes = factors @ np.linalg.eigh(reduced)[1][:, :, ::-1]
         present = min(count, self.springs - self.conditions)
         result[rows] = 0.0
-        result[rows, :present] = np.swapaxes(shapes, 1, 2)[:, :present]
+        result[rows, :present] = shapes.mT[:, :present]
         return result
 
 
