@@ -7,6 +7,7 @@ left out. A new machine of the same form, with other numbers, uses the same prog
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache, lru_cache
 from importlib.util import find_spec
 from typing import Any
@@ -19,6 +20,7 @@ from kinetostat.engine.form import (
     Specimen,
     TracedFormula,
     TraceOptions,
+    each_alone,
     form_of,
     objectives_of,
     plan_for,
@@ -219,12 +221,23 @@ def program_fill(
         closed: see `ProgramFill`.
     """
     form, fixed = form_of(machine, varying)
-    objectives = tuple(((name, 1.0),) for name in quantities)
-    kind = Specimen(at_home(machine, varying) if closed else machine)
-    plan = plan_for(machine, quantities, varying)
-    options = TraceOptions(closed=closed, plan=plan, judged=judged)
-    recipe = recipe_of(objectives_of, kind, form, objectives=objectives, options=options)
-    return ProgramFill(machine, form, fixed, program_of(recipe), closed)
+    program = program_of_quantities(machine, form, quantities, TraceOptions(closed=closed, judged=judged))
+    return ProgramFill(machine, form, fixed, program, closed)
+
+
+def program_of_quantities(machine: Machine, form: Form, quantities: Sequence[str], options: TraceOptions) -> Runnable:
+    """Return the program of quantities.
+
+    Args:
+        machine: its family, and all parameters that do not vary.
+        form: how its parameters enter.
+        quantities: names from `QUANTITIES`.
+        options: how they are traced; the motions that there are (`plan`) are found here.
+    """
+    kind = Specimen(at_home(machine, form.varying) if options.closed else machine)
+    options = replace(options, plan=plan_for(machine, quantities, form.varying))
+    objectives = tuple(each_alone(quantities))
+    return program_of(recipe_of(objectives_of, kind, form, objectives=objectives, options=options))
 
 
 def program_columns(

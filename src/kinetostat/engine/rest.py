@@ -20,13 +20,11 @@ from kinetostat.engine.form import (
     form_of,
     formula_of,
     new_inputs,
-    objectives_of,
-    plan_for,
     result_of,
     traced_joints,
     traced_machine,
 )
-from kinetostat.engine.kernel import program_columns, program_of, recipe_of
+from kinetostat.engine.kernel import program_columns, program_of, program_of_quantities, recipe_of
 from kinetostat.engine.trace import Runnable
 from kinetostat.equilibrium.reduced import reduced_machine
 from kinetostat.frozen import dataclass
@@ -143,22 +141,13 @@ class RestFill:
         self._machine, self._closed = machine, closed
         self._form, self._fixed = form_of(machine, paths)
         self._states = StatePrograms(machine, self._form, closed, native=True)
-        self._program = _program_at_rest(machine, self._form, quantities, closed, stepping=False)
+        self._program = program_of_quantities(machine, self._form, quantities, TraceOptions(closed=closed))
 
     def __call__(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Evaluate a slab, see `Fill`."""
         program_inputs = program_columns(self._machine, self._form, columns, len(status), self._closed)
         program_inputs += self._states.rest_coordinates(self._fixed, program_inputs, len(status))
         self._program.run(self._fixed, program_inputs, results, status)
-
-
-def _program_at_rest(machine: Machine, form: Form, quantities: Sequence[str], closed: bool, stepping: bool) -> Runnable:
-    """The program of quantities at states whose coordinates are its last columns; options as in `TraceOptions`."""
-    objectives = tuple(((name, 1.0),) for name in quantities)
-    plan = plan_for(machine, quantities, form.varying)
-    options = TraceOptions(closed=closed, plan=plan, stepping=stepping)
-    kind = Specimen(at_home(machine, form.varying))
-    return program_of(recipe_of(objectives_of, kind, form, objectives=objectives, options=options))
 
 
 class LegwiseRestFill:
@@ -179,7 +168,8 @@ class LegwiseRestFill:
         self.form, self.fixed = form_of(machine, paths)
         step = partial(recipe_of, step_of, Specimen(at_home(machine, paths)), self.form, closed=closed)
         self._first, self._chord = program_of(step(step="first")), program_of(step(step="chord"))
-        self._program = _program_at_rest(machine, self.form, quantities, closed, stepping=True)
+        options = TraceOptions(closed=closed, stepping=True)
+        self._program = program_of_quantities(machine, self.form, quantities, options)
         self.size = self._program.rows - self._count - 1  # the last row is the square of the step's size
 
     def __call__(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
