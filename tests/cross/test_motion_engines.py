@@ -143,7 +143,7 @@ class Engine:
         for body in range(1, self.model.nbody) if stretched else ():
             if self.model.body(body).name.endswith(POINT):
                 self.model.body_inertia[body] = 0.0
-        bodies = build(analysis.state.configuration).world.every()
+        bodies = build(analysis.state.configuration).world.subtree()
         driven = [freedom.name for body in bodies for freedom in body.freedoms if freedom.drive]
         self.drives = [self.model.joint(name).dofadr[0] for name in driven]
         for body in bodies:

@@ -155,7 +155,7 @@ def test_mujoco_sags_as_a_loaded_machine(name, weights):
     machine = load(name, [*weights, f"load.gravity={gravity}", "limits.actuator_force=none"])
     state = under_load(machine)
     root = ElementTree.fromstring(text_of(analyze(machine)))
-    bodies = {body.name: body for body in mjcf_model.build(respond(machine).configuration).world.every()}
+    bodies = {body.name: body for body in mjcf_model.build(respond(machine).configuration).world.subtree()}
     for element in root.iter("body"):
         body = bodies.get(element.get("name"))
         density = machine.tables["linear_density"].legs

@@ -26,8 +26,9 @@ from kinetostat.studies.poses import chosen_axes, grid_of
 from kinetostat.studies.storage import write_text
 
 X, Y, HEIGHT = "pose.x", "pose.y", "pose.z"
+"""Coordinates of the columns and of the rows of a map, and the one that is corrected."""
 ROUNDS = 3
-"""Times that the sag is computed, each at the height to which the one before has raised the tool: it changes little."""
+"""Times that the sag is computed, each time at the height to which the last one raised the tool: it changes little."""
 POINTS = 9
 """Points along each axis where no ranges are given: sag bends smoothly, and splines go between the points."""
 FEWEST_POINTS = 3

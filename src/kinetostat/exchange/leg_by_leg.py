@@ -116,7 +116,7 @@ def document_of(machine: Machine, built: Configuration | None = None) -> Documen
     document: Document = {"schema": SCHEMA_VERSION, "name": machine.name, "family": NAME}
     document |= {"space": "planar"} if machine.family.planar else {}
     document |= {"platform": {"point": _numbers(point)}, "pose": _pose(configuration, point)}
-    document["legs"] = [_Chain(leg, point).document() for leg in configuration.legs]
+    document["legs"] = [_LegEntry(leg, point).document() for leg in configuration.legs]
     tables = {"tool": _tool(machine, turn)}
     tables |= {name: _changed_entries(machine, name) for name in ("drives", "servo", "damping", "cutting")}
     tables |= {"load": _load(machine, turn), "limits": _limits(machine, turn, built)}
@@ -207,7 +207,7 @@ def _pose(configuration: Configuration, point: Vector) -> dict[str, float]:
 
 
 @dataclass
-class _Chain:
+class _LegEntry:
     """The joints and links of one leg while they are written.
 
     Attributes:
@@ -229,61 +229,68 @@ class _Chain:
         for (is_joint, _), run in groupby(elements, key=_place_of_joint):
             row = list(run)
             if is_joint:
-                self._add_joints([element for element in row if isinstance(element, Joint)])
+                self._add_joints_at_point([element for element in row if isinstance(element, Joint)])
             else:
                 self._add_elements(row)
         if self.pending:
-            self._add({"name": "flange", "type": "fixed", "point": _numbers(self.tip)})
+            self._add_joint({"name": "flange", "type": "fixed", "point": _numbers(self.tip)})
         self.joints[-1]["joins"] = [self.joints[-1]["joins"][0], PLATFORM]
         _with_universal(self.joints)
         links = {"links": self.links} if self.links else {}
         return {"name": str(self.leg.name), "joints": self.joints, **links}
 
     def _add_elements(self, row: Sequence[Element]) -> None:
-        series: list[Spring] = []
+        """Add elements between joints: drives and hinges become joints, all else waits for the next joint."""
+        series: list[Spring] = []  # springs of one drive, one behind the other
         for element in row:
             if isinstance(element, Spring) and series and _same_freedom(series[0].joint, element.joint):
                 series.append(element)
                 self.joints[-1]["stiffness"] = [f"{self._name(s.name)} {_stiffness(s)}" for s in series]
             elif isinstance(element, Spring) and (element.actuated or element.hinge):
                 series = [element]
-                about: dict[str, Any] = {"actuated": True} if element.actuated else {}
-                about |= {"preload": float(element.preload)} if element.preload else {}
-                about |= {"acts": element.acts} if element.acts else {}
-                about |= {"stiffness": _stiffness(element)}
-                self._add({**self._freedom(element.joint), **about}, element.part_name)
+                entries: dict[str, Any] = {"actuated": True} if element.actuated else {}
+                entries |= {"preload": float(element.preload)} if element.preload else {}
+                entries |= {"acts": element.acts} if element.acts else {}
+                entries |= {"stiffness": _stiffness(element)}
+                self._add_joint({**self._freedom(element.joint), **entries}, element.part_name)
             elif isinstance(element, Parallelogram):
-                self._add(_parallelogram(element), element.name)
+                self._add_joint(_parallelogram(element), element.name)
             else:
                 self.pending += [spring for spring in element.springs if spring.stiffness != RIGID]
 
-    def _add_joints(self, row: Sequence[Joint]) -> None:
-        points = {joint.point for joint in row}
-        numbers = _numbers(row[0].point) if row[0].point is not None else self._near()
-        turning = len(points) == 1 and None not in points and not any(joint.pitch for joint in row)
-        if len(row) == 2 and turning:
-            axes = {"first_axis": _numbers(row[0].axis), "second_axis": _numbers(row[1].axis)}
-            self._add({"type": "universal", "point": numbers, **axes}, row[0].name)
-        elif len(row) == 3 and turning:
-            self._add({"type": "spherical", "point": numbers}, row[0].name)
-        else:
-            for joint in row:
-                self._add(self._freedom(joint), joint.name)
+    def _add_joints_at_point(self, joints: Sequence[Joint]) -> None:
+        """Add joints that share a point, or have none: two hinges are a universal joint, three a spherical one."""
+        first = joints[0]
+        if first.point is not None and len(joints) in (2, 3) and not any(joint.pitch for joint in joints):
+            table: dict[str, Any] = {"type": "spherical", "point": _numbers(first.point)}
+            if len(joints) == 2:
+                table |= {"type": "universal", "first_axis": _numbers(first.axis)}
+                table |= {"second_axis": _numbers(joints[1].axis)}
+            self._add_joint(table, first.name)
+            return
+        for joint in joints:
+            self._add_joint(self._freedom(joint), joint.name)
 
     def _freedom(self, joint: Joint) -> dict[str, Any]:
+        """Return the entries of a joint with one freedom."""
         axis = {"axis": _numbers(joint.axis)}
         if joint.point is None:
-            point = _numbers(joint.carriage) if joint.carriage is not None else self._near()
+            point = _numbers(joint.carriage) if joint.carriage is not None else self._place_of_slide()
             return {"type": "prismatic", "point": point, **axis}
         pitch = {"pitch": float(joint.pitch)} if joint.pitch else {}
         return {"type": "helical" if pitch else "revolute", "point": _numbers(joint.point), **axis, **pitch}
 
-    def _near(self) -> list[float]:
+    def _place_of_slide(self) -> list[float]:
         """Return a point for a slide that has none: that of the joint before it."""
         return list(self.joints[-1]["point"]) if self.joints else _numbers(next(iter(self.leg.path), self.tip))
 
-    def _add(self, joint: dict[str, Any], title: str = "") -> None:
-        """Add a joint, and before it what deflects since the last one: as its seat, or as the link that it ends."""
+    def _add_joint(self, joint: dict[str, Any], title: str = "") -> None:
+        """Add a joint, and before it what deflects since the last one: as its seat, or as the link that it ends.
+
+        Args:
+            joint: its entries; a name among them is only a wish.
+            title: the name of the part, if its entries have none.
+        """
         name = self._free_name(joint.pop("name", "") or self._name(title) or joint["type"])
         bodies = (self.joints[-1]["joins"][1] if self.joints else BASE), f"body {len(self.joints) + 1}"
         compliance = compliance_at(self.pending, Vector(*joint["point"])).tolist() if self.pending else []
@@ -310,7 +317,7 @@ class _Chain:
 
 
 def _place_of_joint(element: Element) -> tuple[bool, Vector | None]:
-    """Return whether an element is a joint, and its point: joints about one point are written as one, a Hooke joint."""
+    """Return whether an element is a joint, and its point: hinges about one point are written as one joint."""
     return (True, element.point) if isinstance(element, Joint) else (False, None)
 
 

@@ -130,7 +130,7 @@ def _settings(root: Element, pace: Pace) -> None:
 
 def _middle_and_extent(model: Model) -> tuple[Array, float]:
     """Return the middle and the diagonal of the box that holds the machine, m."""
-    bodies = (model.platform, *model.world.every())
+    bodies = (model.platform, *model.world.subtree())
     points = np.array([point for body in bodies for point in (body.origin, *body.reach)])
     low, high = points.min(axis=0), points.max(axis=0)
     return (low + high) / 2.0, max(float(np.linalg.norm(high - low)), LEAST_EXTENT)
@@ -200,7 +200,9 @@ class _Bodies:
         if freedom.stiffness > 0.0:
             joint.set("stiffness", _numbers(freedom.stiffness))
             joint.set("damping", _numbers(self._pace.damping(freedom.stiffness)))
-        if (armature := self._pace.armature(freedom)) != 0.0:  # also of a passive slide, along which a link stretches
+        if (
+            armature := self._pace.armatures.get(freedom.name, 0.0)
+        ) != 0.0:  # also of a passive slide, along which a link stretches
             joint.set("armature", _numbers(armature))
 
     def _draw_joint(self, element: Element, freedom: Freedom, body: Body) -> None:
@@ -238,7 +240,7 @@ def _add_inertia(element: Element, part: Heavy, origin: Array) -> None:
 
 def _constraints(root: Element, model: Model) -> None:
     equality = SubElement(root, "equality")
-    origins = {body.name: body.origin for body in [*model.world.every(), model.platform]}
+    origins = {body.name: body.origin for body in [*model.world.subtree(), model.platform]}
     for closing in model.closings:
         first, second = closing.bodies
         # MuJoCo wants the anchor of `connect` in the first body, of `weld` in the second.

@@ -6,7 +6,6 @@ All frames are parallel to the base frame, so that every axis is written as it i
 
 import dataclasses
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import field
 
 import numpy as np
@@ -68,9 +67,9 @@ class Body:
     reach: list[Array] = field(default_factory=list)
     leg: str = ""
 
-    def every(self) -> list["Body"]:
-        """Return the body and all bodies that hang on it, each before those that hang on it itself."""
-        return [self, *(body for child in self.children for body in child.every())]
+    def subtree(self) -> list["Body"]:
+        """Return the body and all bodies that hang on it, each after the one on which it hangs."""
+        return [self, *(body for child in self.children for body in child.subtree())]
 
 
 @dataclass(frozen=True)
@@ -145,14 +144,19 @@ class _Chain:
 
     def __init__(self, model: Model, leg: Leg, plane: Plane | None) -> None:
         self._model, self._leg, self._plane = model, leg, plane
+        self._leg_number = len(model.chains)
         self._body = model.world
         self._ends_in_ball = False
         chain = pieces(leg, plane)
-        self._bodies = [self._body]
+        self._bodies = [self._body]  # one more than pieces so far: the last is where the next piece begins
         for i, piece in enumerate(chain):
             self._add(piece, next(filter(None, map(_start, chain[i + 1 :])), None))
             self._bodies.append(self._body)
         model.chains.append(self._bodies)
+
+    def _keep_bars(self, halves: list[tuple[Body, Body]]) -> None:
+        """Note the halves of the bars of the piece that is being added."""
+        self._model.bars[self._leg_number, len(self._bodies) - 1] = halves
 
     def close(self) -> None:
         """Join the last body to the platform."""
@@ -184,14 +188,14 @@ class _Chain:
         return body
 
     def _add_freedom(self, name: str, joint: Joint, stiffness: float = 0.0, drive: Spring | None = None) -> None:
-        """Give the last body a freedom; a screw is a hinge and a slide that a thread couples."""
+        """Give the last body a hinge, or a slide if the joint has no point; a screw has both, coupled by a thread."""
         axis, point = array(joint.axis), None if joint.point is None else array(joint.point)
-        hinge = Freedom(self._model.unique(name), axis, point, stiffness, drive)
-        self._body.freedoms.append(hinge)
+        freedom = Freedom(self._model.unique(name), axis, point, stiffness, drive)
+        self._body.freedoms.append(freedom)
         if joint.pitch != 0.0:
             slide = Freedom(self._model.unique(f"{name} advance"), axis, None)
             self._body.freedoms.append(slide)
-            self._model.threads.append(Thread(slide.name, hinge.name, float(joint.pitch)))
+            self._model.threads.append(Thread(slide.name, freedom.name, float(joint.pitch)))
 
     def _add_joint(self, piece: Joint | Spring, next_start: Array) -> None:
         """Add a joint or a spring: hinges about one point share a body, all others have one each.
@@ -235,14 +239,14 @@ class _Chain:
         start, end = array(strut.start), array(strut.end)
         along = (end - start) / np.linalg.norm(end - start)
         near = self._add_body(strut.name, start)
-        for axis in _across(along):
+        for axis in _vectors_across(along):
             self._add_freedom(f"{strut.name} swing", Joint(Vector(*axis), strut.start))
         if np.isfinite(strut.stiffness):
             self._add_body(f"{strut.name} rod", (start + end) * 0.5)
             driven = (spring for spring in self._leg.springs if spring.actuated and spring.joint.point is None)
             self._add_freedom(f"{strut.name} stretch", Joint(Vector(*along)), strut.stiffness, next(driven, None))
         self._body.reach.append(end)
-        self._model.bars[len(self._model.chains), len(self._bodies) - 1] = [(near, self._body)]
+        self._keep_bars([(near, self._body)])
         self._ends_in_ball = True
 
     def _add_ball(self) -> None:
@@ -266,7 +270,7 @@ class _Chain:
                 self._add_freedom(f"{piece.name} stretch {bar}", Joint(piece.along), float(piece.bar))
             tips.append(self._body)
             halves.append((half, self._body))
-        self._model.bars[len(self._model.chains), len(self._bodies) - 1] = halves
+        self._keep_bars(halves)
         (_, first), (_, second) = piece.bars
         tips[1].reach.append(array(second))
         self._body = tips[0]
@@ -283,7 +287,7 @@ def _start(piece: Piece) -> Vector | None:
     return piece.near if isinstance(piece, Parallelogram) else piece.start
 
 
-def _across(along: Array) -> Sequence[Array]:
+def _vectors_across(along: Array) -> tuple[Array, Array]:
     """Return two unit vectors across a unit vector and each other."""
     first = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
     first = first / np.linalg.norm(first)

@@ -84,7 +84,7 @@ class Pace:
         retardation: damping of a spring per its stiffness, s.
         settling: time after which a deflection has come to rest, s.
         inertias: mass, its centre and inertia of every body, by its name.
-        armatures: inertia added to joints by name, kg or kg·m²; None if `armature` computes it.
+        armatures: inertia added to joints by name, kg or kg·m²; joints without a name here get none.
         carried: further masses on the platform.
     """
 
@@ -92,18 +92,12 @@ class Pace:
     retardation: float
     settling: float
     inertias: dict[str, Heavy]
-    armatures: dict[str, float] | None = None
+    armatures: dict[str, float]
     carried: tuple[Heavy, ...] = ()
 
     def damping(self, stiffness: float) -> float:
         """Return the damping of a joint with a spring, N·s/m or N·m·s/rad."""
         return stiffness * self.retardation
-
-    def armature(self, freedom: Freedom) -> float:
-        """Return the inertia added to a joint, kg or kg·m², so that no spring is too fast for the time step."""
-        if self.armatures is not None:
-            return self.armatures.get(freedom.name, 0.0)
-        return freedom.stiffness * ARMATURE_ROOT**2 * self.retardation * self.step
 
 
 def pace_of(analysis: Analysis, model: Model) -> Pace:
@@ -113,10 +107,17 @@ def pace_of(analysis: Analysis, model: Model) -> Pace:
     gyration = GYRATION * length
     step = step_for(analysis, min(masses.values()), gyration)
     root = math.sqrt(max(compliances(analysis, length)) * sum(masses.values()))  # 1/omega of the slowest motion
-    places = {body.name: body.origin for body in model.world.every()}
+    places = {body.name: body.origin for body in model.world.subtree()}
     places[model.platform.name] = np.array(reference_point(analysis))  # so that loads on the platform act there
     inertias = {name: Heavy(mass, places[name], mass * gyration**2 * np.eye(3)) for name, mass in masses.items()}
-    return Pace(step, retardation=2.0 * DAMPING * root, settling=SETTLING_ROOTS * root, inertias=inertias)
+    retardation = 2.0 * DAMPING * root
+    # So that no spring is too fast for the time step.
+    armatures = {
+        freedom.name: freedom.stiffness * ARMATURE_ROOT**2 * retardation * step
+        for body in _moving_bodies(model)
+        for freedom in body.freedoms
+    }
+    return Pace(step, retardation, SETTLING_ROOTS * root, inertias, armatures)
 
 
 def step_for(analysis: Analysis, least_mass: float, gyration: float) -> float:
@@ -165,8 +166,8 @@ def vibrating_pace(analysis: Analysis, model: Model) -> Pace:
     machine, joints, configuration = analysis.machine, analysis.state.joints, analysis.state.configuration
     carried = tuple(on_platform(machine, configuration.platform))
     members = located_members(machine, configuration, None if joints is None else joints.coordinates)
-    heavy, slide_armatures = _parts_by_body(model, configuration, links(members, configuration))
-    known_mass = sum(part.mass for parts in (carried, *heavy.values()) for part in parts)
+    parts, slide_armatures = _parts_by_body(model, configuration, links(members, configuration))
+    known_mass = sum(part.mass for parts_of_body in (carried, *parts.values()) for part in parts_of_body)
     if known_mass == 0.0:
         raise InputError(
             'Nothing of this machine has a mass, so that it cannot vibrate; give it one, e.g. --set tool.mass="5 kg".'
@@ -176,16 +177,16 @@ def vibrating_pace(analysis: Analysis, model: Model) -> Pace:
     places = {body.name: body.origin for body in _moving_bodies(model)}
     places[model.platform.name] = np.array(reference_point(analysis))
     inertias = {
-        name: one_body(heavy[name]) if name in heavy else Heavy(light, at, light * gyration**2 * np.eye(3))
-        for name, at in places.items()
+        name: one_body(parts[name]) if name in parts else Heavy(light, place, light * gyration**2 * np.eye(3))
+        for name, place in places.items()
     }
     # A platform that carries masses is heavier than its entry here, which may be that of a body without a mass.
-    least = min(part.mass for name, part in inertias.items() if name != model.platform.name or not carried)
+    least_mass = min(part.mass for name, part in inertias.items() if name != model.platform.name or not carried)
     between_springs = _inertias_between_springs(_moving_bodies(model), inertias)
     sources = _rotors(machine, model), slide_armatures, between_springs
     armatures = {name: sum(source.get(name, 0.0) for source in sources) for source in sources for name in source}
     spring_steps = _steps_for_springs(_moving_bodies(model), inertias, between_springs)
-    step = min([step_for(analysis, least, gyration), *spring_steps])
+    step = min([step_for(analysis, least_mass, gyration), *spring_steps])
     period = 2.0 * math.pi * math.sqrt(max(compliances(analysis, gyration)) * known_mass)
     return Pace(
         step=step,
@@ -199,7 +200,7 @@ def vibrating_pace(analysis: Analysis, model: Model) -> Pace:
 
 def _moving_bodies(model: Model) -> list[Body]:
     """Return the bodies of the legs."""
-    return [body for body in model.world.every() if body is not model.world]
+    return [body for body in model.world.subtree() if body is not model.world]
 
 
 def _rotors(machine: Machine, model: Model) -> dict[str, float]:
@@ -304,13 +305,13 @@ def _steps_for_springs(
     bodies: list[Body], inertias: dict[str, Heavy], between_springs: dict[str, float]
 ) -> list[float]:
     """Return a time step for each spring, s, by the inertia that hangs on it."""
-    inertias_and_stiffness = [
+    pairs = [
         (between_springs.get(freedom.name, _moved_inertia(freedom, inertias[body.name])), freedom.stiffness)
         for body in bodies
         for freedom in body.freedoms
         if freedom.stiffness > 0.0
     ]
-    return [2.0 * math.pi * math.sqrt(size / k) / STEPS_OF_SPRING for size, k in inertias_and_stiffness]
+    return [2.0 * math.pi * math.sqrt(inertia / stiffness) / STEPS_OF_SPRING for inertia, stiffness in pairs]
 
 
 def _moved_inertia(freedom: Freedom, part: Heavy) -> float:

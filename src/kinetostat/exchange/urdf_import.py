@@ -47,7 +47,7 @@ def read_machine(path: Path) -> tuple[Machine, list[str]]:
     home = machine.configure([0.0] * machine.chains().size)
     free = [SPATIAL_POSE[number] for number in task_coordinates(home, home.platform.translation)] or ["x"]
     posed = build({**document, "pose": {name: document["pose"][name] for name in free}}, file.origin)
-    return posed, sorted(bodies.left)
+    return posed, sorted(bodies.uncounted)
 
 
 def machine_text(path: Path) -> str:
@@ -56,9 +56,9 @@ def machine_text(path: Path) -> str:
     Raises:
         InputError: as `read_machine`.
     """
-    machine, left = read_machine(path)
-    names = shorten(", ".join(left))
-    note = f"# Masses of links between the base and the platform only; not counted: {names}.\n" if left else ""
+    machine, uncounted = read_machine(path)
+    names = shorten(", ".join(uncounted))
+    note = f"# Masses of links between the base and the platform only; not counted: {names}.\n" if uncounted else ""
     return (
         f"# Read from {path.name}. The home pose is the one of zero joint coordinates; actuators of which the URDF\n"
         f"# gives no stiffness are rigid here.\n{note}{as_file(machine)}"
@@ -69,7 +69,7 @@ class Bodies:
     """The heavy bodies of a file: links that fixed joints hold together are one body.
 
     Attributes:
-        left: names of the links with a mass that no table has yet; those of the base do not count.
+        uncounted: names of the links with a mass that no table has yet; those of the base do not count.
     """
 
     def __init__(self, file: UrdfFile) -> None:
@@ -83,7 +83,7 @@ class Bodies:
                 self._body[link] = self._body[joint.parent] if fixed else link
         for link in file.masses:
             self._parts.setdefault(self._body[link], []).append(link)
-        self.left = {link for link in file.masses if self._body[link] != file.root}
+        self.uncounted = {link for link in file.masses if self._body[link] != file.root}
 
     def links(self, link: str) -> list[str]:
         """Return the links with a mass in the body of a link."""
@@ -92,10 +92,10 @@ class Bodies:
     def table(self, links: Iterable[str]) -> Document:
         """Join some links into one mass with its centre and inertia, in the root link's frame; empty without a mass.
 
-        These links are no longer in `left`, so that no mass counts twice.
+        These links are no longer in `uncounted`, so that no mass counts twice.
         """
-        names = {name for link in links for name in self.links(link)} & self.left
-        self.left -= names
+        names = {name for link in links for name in self.links(link)} & self.uncounted
+        self.uncounted -= names
         if not names:
             return {}
         whole = one_body([self._masses[name] for name in sorted(names)])
