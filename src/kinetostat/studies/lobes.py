@@ -239,18 +239,7 @@ def _lobes_of(
     all_borders = [(at_pose.borders(engagement), at_pose) for at_pose in vibrations]
     known_borders = [(border, at_pose) for border, at_pose in all_borders if border is not None]
     if not known_borders:
-        first, nothing = vibrations[0].vibration, np.zeros(0)
-        message = first.message if len(vibrations) == 1 else "At none of these poses does the machine have vibrations."
-        return Lobes(
-            state=state,
-            status=first.status,
-            message=message,
-            teeth=engagement.teeth,
-            pressure=engagement.pressure,
-            speeds=nothing,
-            widths=nothing,
-            poses=0,
-        )
+        return _no_lobes(state, [at_pose.vibration for at_pose in vibrations], engagement)
     worst_border, worst = min(known_borders, key=lambda pair: pair[0].least[0])
     least, frequency = worst_border.least
     # Where every width is stable, nothing chatters: the curve then reaches to the highest frequency that was tried.
@@ -273,6 +262,21 @@ def _lobes_of(
         poses=len(known_borders),
         worst=worst.pose,
         tool=worst.vibration.tool,
+    )
+
+
+def _no_lobes(state: MachineState, vibrations: Sequence[Vibration], engagement: Engagement) -> Lobes:
+    """The answer where nothing vibrates at any pose."""
+    message = "At none of these poses does the machine have vibrations."
+    return Lobes(
+        state=state,
+        status=vibrations[0].status,
+        message=vibrations[0].message if len(vibrations) == 1 else message,
+        teeth=engagement.teeth,
+        pressure=engagement.pressure,
+        speeds=np.zeros(0),
+        widths=np.zeros(0),
+        poses=0,
     )
 
 

@@ -21,6 +21,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.motions import Motion
 from kinetostat.studies.vibration import modes
+from kinetostat.vibration.modes import Modes
 
 STEPS = 8192
 """Equal steps of a motion in which modes are followed. A mode that swings 400 times in the motion has 20 of them in a
@@ -81,17 +82,11 @@ def modes_along(state: MachineState, form: RigidForm, motion: Motion, wrench: Ar
     Returns:
         None where no mode is known, or the motion takes no time.
     """
-    # Motors stand where they should: rotors without inertia and damping leave the ends of actuators where they are.
-    machine = with_every_drive(state.machine, {"drives.rotor_inertia": 0.0, "drives.rotor_damping": 0.0})
-    try:
-        answer = modes(machine)
-    except InputError:  # nothing has a mass, or no spring deflects
+    modes_and_ratios = None if motion.timeless else _modes_of_standing_motors(state.machine)
+    if modes_and_ratios is None:
         return None
-    if answer.solution is None or answer.damping is None or not answer.solution.mode_count or motion.timeless:
-        return None
-    solution, ratios = answer.solution, answer.damping.ratios(answer.solution)
+    solution, ratios = modes_and_ratios
     shapes, rates = solution.tool[:, : solution.mode_count], 2.0 * np.pi * solution.frequencies
-    displacements = np.linalg.norm(shapes[3:], axis=0)
     times = np.linspace(motion.times[0], motion.times[-1], STEPS + 1)
     loads = shapes.T @ np.array([np.interp(times, motion.times, row) for row in wrench])
     # Before and after a motion the machine stands still, while accelerations may begin and end with a jump.
@@ -99,18 +94,35 @@ def modes_along(state: MachineState, form: RigidForm, motion: Motion, wrench: Ar
     before = None if motion.periodic else first_load
     amounts, final_rates = swings_under(loads, rates, ratios, times[1] - times[0], before)
     surplus = amounts - loads
-    greatest_at_rest = np.linalg.norm(shapes[3:] @ loads, axis=0).max()
     # All of a mode moves in one ratio, so that the displacement of the tool point measures its rotations as well.
+    displacements = np.linalg.norm(shapes[3:], axis=0)
+    greatest_at_rest = np.linalg.norm(shapes[3:] @ loads, axis=0).max()
     excited = displacements * np.abs(surplus).max(axis=1) > EXCITED_SHARE * greatest_at_rest
     # What is left swings about the deflection at rest; the amplitude of a mode has its distance and its rate together.
-    amplitudes = displacements * np.hypot(amounts[:, -1] - last_load, final_rates / rates)
+    final_amplitudes = displacements * np.hypot(amounts[:, -1] - last_load, final_rates / rates)
     return ModesAlong(
         frequency=float(solution.frequencies[0]),
         modes=tuple(solution.frequencies[excited].tolist()),
         times=times,
         surplus=(shapes[:, excited] @ surplus[excited]).T,
-        after=0.0 if motion.periodic else float(amplitudes[excited].sum()),
+        after=0.0 if motion.periodic else float(final_amplitudes[excited].sum()),
     )
+
+
+def _modes_of_standing_motors(machine: Machine) -> tuple[Modes, Array] | None:
+    """The modes of a machine whose motors stand where they should, and their damping ratios; None where it has none.
+
+    Rotors without inertia and damping leave the ends of actuators where they are.
+    """
+    standing = with_every_drive(machine, {"drives.rotor_inertia": 0.0, "drives.rotor_damping": 0.0})
+    try:
+        vibration = modes(standing)
+    except InputError:  # nothing has a mass, or no spring deflects
+        return None
+    solution, damping = vibration.solution, vibration.damping
+    if solution is None or damping is None or not solution.mode_count:
+        return None
+    return solution, damping.ratios(solution)
 
 
 def _wrench_at_ends(form: RigidForm, motion: Motion) -> Array:

@@ -24,7 +24,7 @@ from kinetostat.spec.validation import LONGEST_MACHINE_NAME
 from kinetostat.studies.optimisation.assessment import Assessor, DesignVerdict, Outcome, Robustness, robustness_of
 from kinetostat.studies.optimisation.log import Log, best_designs
 from kinetostat.studies.optimisation.problem import Problem
-from kinetostat.studies.optimisation.slopes import Ridge, Surveyor, at_bounds, find_ridges
+from kinetostat.studies.optimisation.slopes import Ridge, Ridges, Surveyor, at_bounds, find_ridges
 from kinetostat.studies.quantities import uncounted_loads
 from kinetostat.studies.sensitivity import relative_sensitivity
 
@@ -177,24 +177,16 @@ def _explain(assess: Assessor, result: Result) -> Result:
     problem = assess.problem
     # A search that descends has compiled the derivatives already.
     survey = Surveyor(problem, searching=problem.descends) if problem.differentiable else None
-    ridges, why_no_ridges = _ridges(problem, survey, result.genes)
+    # Along a front the objectives change against each other, so that ridges are about a single one.
+    ridges = find_ridges(problem, survey, result.genes) if len(problem.objectives) == 1 else Ridges()
     return replace(
         result,
         compliance_changes=tuple(_compliance_changes(problem, result.machine)),
         influences=tuple(_influences(problem, survey, result.genes)) if survey else (),
-        ridges=tuple(ridges),
-        no_ridges=why_no_ridges,
+        ridges=ridges.ridges,
+        no_ridges=ridges.why_none,
         robustness=robustness_of(assess, result.genes),
     )
-
-
-def _ridges(problem: Problem, survey: Surveyor | None, genes: Array) -> tuple[list[Ridge], str]:
-    """The ridges through a design, or the reason why none were sought; neither of several objectives."""
-    if len(problem.objectives) > 1:
-        return [], ""
-    if survey is None:
-        return [], "No ridges are sought, because the objective has no derivatives, or too many poses for them."
-    return find_ridges(problem, survey, genes)
 
 
 def _compliance_changes(problem: Problem, machine: Machine) -> list[ComplianceChange]:

@@ -8,6 +8,7 @@ the objective changes.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -196,35 +197,46 @@ def at_bounds(problem: Problem, genes: Array) -> list[str]:
     return bounds
 
 
-def find_ridges(problem: Problem, survey: Surveyor, genes: Array) -> tuple[list[Ridge], str]:
+class Ridges(NamedTuple):
+    """The ridges through a design, and a sentence on why none were sought; empty if they were."""
+
+    ridges: tuple[Ridge, ...] = ()
+    why_none: str = ""
+
+    @classmethod
+    def none_because(cls, reason: str) -> "Ridges":
+        """No ridges, for a reason."""
+        return cls(why_none=f"No ridges are sought, because {reason}.")
+
+
+def find_ridges(problem: Problem, survey: Surveyor | None, genes: Array) -> Ridges:
     """Find the ridges through a best design.
 
     Args:
         problem: a problem with one objective.
-        survey: computes the derivatives of the problem.
+        survey: computes the derivatives of the problem; None where it has none, or too many.
         genes: genes of the best design [variables].
-
-    Returns:
-        The ridges, and a sentence that says why none could be sought, or "".
     """
+    if survey is None:
+        return Ridges.none_because("the objective has no derivatives, or too many poses for them")
     term = problem.objectives[0].term
     if isinstance(term, PoseTerm) and problem.poses.count > 1 and not term.aggregate.smooth:
-        return [], "No ridges are sought, because the objective has kinks where another pose becomes the worst."
+        return Ridges.none_because("the objective has kinks where another pose becomes the worst")
     if problem.constraints or problem.robust is not None:
-        return [], "No ridges are sought, because the study has constraints or tolerances."
+        return Ridges.none_because("the study has constraints or tolerances")
     bounds = at_bounds(problem, genes)
     free = np.array([k for k, number in enumerate(survey.free) if not bounds[number]], dtype=int)
     if not free.size:
-        return [], "No ridges are sought, because every variable is a choice or is at a bound."
+        return Ridges.none_because("every variable is a choice or is at a bound")
     objective = _FreeObjective(problem, survey, genes, free)
     point = genes[survey.free][free]
     if np.abs(objective.rates(point)[0]).max() > MOST_STATIONARY_SLOPE:
-        return [], "No ridges are sought, because the search has not converged; refine it with method = hybrid."
+        return Ridges.none_because("the search has not converged; refine it with method = hybrid")
     point = objective.settle_across(point)
     curvatures, directions = np.linalg.eigh(objective.rates(point)[1])
     flat = directions[:, np.abs(curvatures) < FLAT_CURVATURE]
     ridges = [objective.ridge(point, direction) for direction in _aligned_basis(flat).T]
-    return [ridge for ridge in ridges if ridge is not None], ""
+    return Ridges(tuple(ridge for ridge in ridges if ridge is not None))
 
 
 def _aligned_basis(flat: Array) -> Array:
