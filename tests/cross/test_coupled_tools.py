@@ -134,6 +134,7 @@ WHOLE = MASS | {"flange.x/flange.x": np.full(3, -1e-6 + 0j)}
         (WHOLE, [0, 1, 2], "line 2: frequencies must rise"),
         ({name: value + 1e-9j for name, value in WHOLE.items()}, [1, 2, 3], "change the sign"),
         (WHOLE | {"tip.q/tip.x": np.zeros(3)}, [1, 2, 3], r"tip\.q/tip\.x real.* is not a column"),
+        (WHOLE | {"tip.x / tip.x": WHOLE["tip.x/tip.x"]}, [1, 2, 3], r"tip\.x/tip\.x has two columns real; keep one"),
     ],
 )
 def test_a_file_with_a_mistake_is_refused(tmp_path, parts, frequencies, says):

@@ -83,7 +83,10 @@ def _tool_of(columns: list[GivenColumn], numbers: list[int]) -> FreeTool:
             )
         moved, pushed = (_Side(match[k], COMPONENTS.index(match[k + 1])) for k in (1, 3))
         kind = KINDS.get((moved.component < 3, pushed.component < 3), "coupling compliance")
-        parts[_Entry(moved, pushed), match[5]] = _values(column, Quantity(kind, ""), numbers)
+        key = _Entry(moved, pushed), match[5]
+        if key in parts:  # the same head with other blanks
+            raise InputError(f"{key[0]} has two columns {key[1]}; keep one of them.")
+        parts[key] = _values(column, Quantity(kind, ""), numbers)
     if frequencies is None or len(frequencies) < 2:
         raise InputError("it needs a column frequency [Hz] with at least two lines.")
     falling = np.flatnonzero(np.diff(frequencies) <= 0.0)
