@@ -43,7 +43,7 @@ CLEARANCE_WORD = "clearance"
 """Part of the path of free motions of joints; paths with * are about these only if they have this word."""
 TOLERANCE_EXAMPLES = {"length": "0.05 mm", "angle": "0.02 deg", "share": "20 um/m"}
 """A tolerance of each kind of number, for messages."""
-WRITE = (
+WRITE_TOLERANCES = (
     'write for example the lines joints = ["0.05 mm", "0.02 deg"] (where joints sit, how their axes stand) and zeros = '
     '"0.02 mm" (of actuators) under [tolerances] into its file, or give --tolerance "joints=0.05 mm"'
 )
@@ -53,7 +53,7 @@ LEAST_NORMAL_PROBABILITY = 1e-16
 """Probability below which no normal number is drawn, that of eight standard deviations: a point of the cube may be 0 or
 1, of which the number would be infinite."""
 UNIFORM_VARIANCE = 1.0 / 3.0
-"""Variance of a variable that is anywhere between -1 and 1."""
+"""Variance of a variable that is evenly distributed between -1 and 1."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def toleranced_parts(
         InputError: there is no line, a line is about nothing, or has no value for what it is about.
     """
     if not tolerances:
-        raise InputError(f"{machine.name} has no tolerances, so that nothing can be off; {WRITE}.")
+        raise InputError(f"{machine.name} has no tolerances, so that nothing can be off; {WRITE_TOLERANCES}.")
     line_of_error: dict[int, tuple[Tolerance, Deviation]] = {}
     for line in tolerances.values():
         numbers = [number for number, error in enumerate(errors) if is_about(line.about, error)]
@@ -120,8 +120,8 @@ def toleranced_parts(
                 "`kinetostat budget MACHINE --list` shows every number that can move the tool."
             )
         line_of_error |= with_value
-    sizes = values(machine)
-    return tuple(_part(machine, errors, group, line_of_error, sizes) for group in _parts_of(errors, line_of_error))
+    nominal = values(machine)
+    return tuple(_part(machine, errors, group, line_of_error, nominal) for group in _parts_of(errors, line_of_error))
 
 
 def is_about(about: str, error: MachineError) -> bool:
@@ -154,10 +154,10 @@ def _fits(pattern: str, path: str) -> bool:
 
 def _parts_of(errors: Sequence[MachineError], numbers: Iterable[int]) -> Iterator[list[int]]:
     """Give the numbers of errors with a tolerance, those of the clearance of a joint together."""
-    parts: dict[str, list[int]] = {}
+    numbers_of_part: dict[str, list[int]] = {}
     for number in sorted(numbers):
-        parts.setdefault(_path_of_part(errors[number]), []).append(number)
-    yield from parts.values()
+        numbers_of_part.setdefault(_path_of_part(errors[number]), []).append(number)
+    yield from numbers_of_part.values()
 
 
 def _path_of_part(error: MachineError) -> str:
@@ -170,11 +170,12 @@ def _part(
     errors: Sequence[MachineError],
     numbers: Sequence[int],
     line_of_error: Mapping[int, tuple[Tolerance, Deviation]],
-    sizes: Mapping[str, object],
+    nominal: Mapping[str, object],
 ) -> TolerancedPart:
+    """Return the part of some errors, all of which the line of the first holds for; fits need its nominal size, m."""
     error, (line, deviation) = errors[numbers[0]], line_of_error[numbers[0]]
-    nominal = sizes.get(error.path, 0.0)
-    size = abs(float(nominal)) if error.kind == "length" and isinstance(nominal, int | float) else 0.0
+    drawn = nominal.get(error.path, 0.0)
+    size = abs(float(drawn)) if error.kind == "length" and isinstance(drawn, int | float) else 0.0
     try:
         limit = deviation.within(error.kind, size)
     except InputError as reason:
@@ -250,16 +251,16 @@ class RandomInputs:
     def _values(self, points: Array) -> Array:
         """Return values of the variables from points of the unit cube [m x q]."""
         # Variable by variable, whose values then lie beside each other.
-        values = 2.0 * np.ascontiguousarray(points.T) - 1.0
+        variables = 2.0 * np.ascontiguousarray(points.T) - 1.0
         is_normal = np.array([part.normal and not part.free for part in self.parts])
-        for variable in np.flatnonzero(is_normal[self.owner]):
-            probabilities = np.clip(points[:, variable], LEAST_NORMAL_PROBABILITY, 1.0 - LEAST_NORMAL_PROBABILITY)
-            values[variable] = ndtri(probabilities) / SIGMAS
-        for size in (2, 3):
-            of_size = [variables for variables in self.blocks if len(variables) == size]
-            if of_size:
-                values[np.array(of_size)] = _in_ball(values[np.array(of_size)])
-        return values.T
+        for number in np.flatnonzero(is_normal[self.owner]):
+            probabilities = np.clip(points[:, number], LEAST_NORMAL_PROBABILITY, 1.0 - LEAST_NORMAL_PROBABILITY)
+            variables[number] = ndtri(probabilities) / SIGMAS
+        for size in (2, 3):  # coordinates of a point in a disc, and in a ball
+            blocks = np.array([block for block in self.blocks if len(block) == size])
+            if len(blocks):
+                variables[blocks] = _in_ball(variables[blocks])
+        return variables.T
 
     @property
     def blocks(self) -> list[Integers]:

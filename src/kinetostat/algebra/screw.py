@@ -76,6 +76,10 @@ class Wrench(Screw):
         """
         return self.rotational.dot(twist.rotational) + self.translational.dot(twist.translational)
 
+    def in_newtons(self, shrink: Scalar) -> tuple[Scalar, ...]:
+        """The components, N, with the moment times `shrink` (1/m), so that it compares with the force."""
+        return (*(self.rotational * shrink).components(), *self.translational.components())
+
 
 NO_MOTION = Twist(ZERO, ZERO)
 NO_WRENCH = Wrench(ZERO, ZERO)

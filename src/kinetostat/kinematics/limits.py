@@ -7,6 +7,7 @@ Source: the definitions on the documentation's page on limits and workspace.
 
 import math
 from collections.abc import Sequence
+from operator import itemgetter
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.display import Display
@@ -108,16 +109,20 @@ def parts_of(
     return Parts(configuration.legs, configuration.platform.rotation.z, machine.family.planar, slides, actuators)
 
 
-def _checks(machine: Machine, rows: Sequence[Limit], parts: Parts, length: Scalar) -> list[Check]:
-    order = list(About)
-    checks = []
-    for limit in rows:
+def _checks(machine: Machine, limits: Sequence[Limit], parts: Parts, length: Scalar) -> list[Check]:
+    """Compare parts with limits, part by part and not limit by limit.
+
+    So the first limit that a pose passes is that of the first part that passes one: parts come in the
+    order of `About`.
+    """
+    about_order, checks_in_place = list(About), []
+    for limit in limits:
         bound = limit.compared(getattr(machine.tables["limits"], limit.name))
         slack = LIMIT_SLACK * limit.scale(bound, length)
         for place, part, measure in limit.measure(parts):
-            checks.append((order.index(limit.about), place, Check(limit, part, measure, bound, slack)))
-    # Part by part, not limit by limit: the first limit that a pose passes is that of the first part that passes one.
-    return [check for _, _, check in sorted(checks, key=lambda item: item[:2])]
+            check = Check(limit, part, measure, bound, slack)
+            checks_in_place.append(((about_order.index(limit.about), place), check))
+    return [check for _, check in sorted(checks_in_place, key=itemgetter(0))]
 
 
 def travels(chains: Chains, joints: Sequence[Scalar]) -> list[tuple[str, Scalar]]:
@@ -139,7 +144,7 @@ def why_beyond(checks: Sequence[Check], display: Display) -> str:
     for check in checks:
         if not check.kept:
             passed.setdefault(check.limit.name, []).append(check)
-    return " ".join(_sentence(of_limit, display) for of_limit in passed.values())
+    return " ".join(_sentence(checks_of_limit, display) for checks_of_limit in passed.values())
 
 
 def _sentence(passed: Sequence[Check], display: Display) -> str:

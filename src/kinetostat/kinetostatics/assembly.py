@@ -141,7 +141,7 @@ def _sharing(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench])
     sizes: list[Scalar] = []
     remaining_rows = iter(rows)
     for leg, mode in zip(balanced, modes, strict=True):
-        shares = tuple(Twist(Vector(*row[:3]), Vector(*row[3:])) for row in islice(remaining_rows, len(mode.wrenches)))
+        shares = tuple(map(Twist.of, islice(remaining_rows, len(mode.wrenches))))
         spring_twists = [combine(shares, row) if row else NO_MOTION for row in mode.loads]
         sharing.append(shares)
         flexibility += spring_twists
@@ -269,7 +269,7 @@ def dual_twists(
         The twists at P in base axes, and the singularity margin as in `solve.dual_basis`.
     """
     shrink = reciprocal(length)
-    scaled = [Wrench(wrench.rotational * shrink, wrench.translational).components() for wrench in wrenches]
+    scaled = [wrench.in_newtons(shrink) for wrench in wrenches]
     rows, singularity_margin = dual_basis(scaled, squares)
     return [Twist(Vector(*row[:3]) * shrink, Vector(*row[3:])) for row in rows], singularity_margin
 
@@ -293,7 +293,7 @@ def least_energy_rows(
         margin of W.
     """
     shrink = reciprocal(length)
-    columns = [Wrench(wrench.rotational * shrink, wrench.translational).components() for wrench in wrenches]
+    columns = [wrench.in_newtons(shrink) for wrench in wrenches]
     if len(wrenches) < SIZE:
         return [NO_MOTION.components()] * len(wrenches), 0.0, 0.0
     balance, internal, singularity_margin = right_inverse([list(row) for row in zip(*columns, strict=True)])

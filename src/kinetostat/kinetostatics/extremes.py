@@ -9,7 +9,6 @@ import math
 from collections.abc import Sequence
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, smaller, sqrt, total, where
-from kinetostat.algebra.screw import Wrench
 from kinetostat.algebra.solve import handedness
 from kinetostat.algebra.symmetric import SIZE, Symmetric6, greatest_eigenvalue
 from kinetostat.kinetostatics.indices import PLANAR, SPATIAL
@@ -158,14 +157,14 @@ def aspect(response: Response) -> Scalar:
     if len(wrenches) != SIZE:
         return 0.0
     shrink = reciprocal(response.configuration.length)
-    scaled = [Wrench(wrench.rotational * shrink, wrench.translational).components() for wrench in wrenches]
+    scaled = [wrench.in_newtons(shrink) for wrench in wrenches]
     sign = handedness(scaled)
     for leg, screws in zip(response.configuration.legs, response.legs, strict=True):
         if not leg.lines:
             needed = [twist for i, twist in enumerate(screws.passive) if i not in leg.idle]
             # A basis of wrenches is the complement by which handedness turns; the force along a line is to be named.
             lines = screws.wrenches if screws.wrench_squares else ()
-            named = [Wrench(line.rotational * shrink, line.translational).components() for line in lines]
+            named = [line.in_newtons(shrink) for line in lines]
             sign = sign * handedness([*(comparable(twist, shrink) for twist in needed), *named]) * _ball_signs(leg)
     return sign
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 from functools import cache
 from itertools import combinations
 
-from kinetostat.algebra.scalar import Scalar, is_zero, larger, reciprocal, smaller, sqrt, total, where
+from kinetostat.algebra.scalar import Scalar, inner_product, is_zero, larger, reciprocal, smaller, sqrt, total, where
 from kinetostat.algebra.screw import NO_MOTION, Twist, Wrench
 from kinetostat.algebra.solve import Conjugated, conjugate, right_inverse
 from kinetostat.algebra.symmetric import SIZE
@@ -68,32 +68,39 @@ def transmission(configuration: Configuration, legs: Sequence[LegScrews], guide:
     rigid = [_without_flexures(leg.springs, screws) for leg, screws in zip(configuration.legs, legs, strict=True)]
     shrink = reciprocal(configuration.length)
     wrenches = [wrench for leg in rigid for wrench in leg.wrenches] + list(guide)
-    columns = [_components_in_newtons(wrench, shrink) for wrench in wrenches]
+    columns = [wrench.in_newtons(shrink) for wrench in wrenches]
     if len(columns) < SIZE:
-        return Transmission((), (), False, None, (), configuration.length, 0.0)
+        return Transmission(
+            shares=(),
+            internal=(),
+            doubtful=False,
+            wrenches=None,
+            constraints=(),
+            length=configuration.length,
+            margin=0.0,
+        )
     balances = right_inverse([list(row) for row in zip(*columns, strict=True)])
+    amounts_by_component = list(zip(*balances.solution, strict=True))
     shares, internal, driving, constraints = [], [], [], list(guide)
-    first, each_drive_moves, doubtful = 0, True, False  # `first`: number of the leg's first wrench among all
+    first, each_drive_moves, doubtful = 0, True, False
     for leg, screws in zip(configuration.legs, rigid, strict=True):
-        rows = _loads_of_drives(leg, screws)
+        rows, in_leg = _loads_of_drives(leg, screws), slice(first, first + len(screws.wrenches))
         for row in rows:
             # The load of the drive by the amounts of the leg's wrenches that balance a unit wrench, or each other.
-            amounts = [total([c * balances.solution[first + i][j] for i, c in enumerate(row)]) for j in range(SIZE)]
-            shares.append(Twist(Vector(*amounts[:3]) * shrink, Vector(*amounts[3:])))
-            internal.append(
-                tuple(total([c * column[first + i] for i, c in enumerate(row)]) for column in balances.null)
-            )
+            loads = [inner_product(row, amounts[in_leg]) for amounts in amounts_by_component]
+            shares.append(Twist(Vector(*loads[:3]) * shrink, Vector(*loads[3:])))
+            internal.append(tuple(inner_product(row, amounts[in_leg]) for amounts in balances.null))
         of_drives, undriven = _by_drives(screws.wrenches, rows)
         each_drive_moves, doubtful = each_drive_moves and of_drives is not None, doubtful or bool(undriven)
         driving += of_drives or []
         constraints += undriven
-        first += len(screws.wrenches)
+        first = in_leg.stop
     return Transmission(
         shares=tuple(shares),
         internal=tuple(internal),
         doubtful=doubtful,
         wrenches=tuple(driving) if each_drive_moves else None,
-        constraints=tuple(wrench * _reciprocal_size(_components_in_newtons(wrench, shrink)) for wrench in constraints),
+        constraints=tuple(wrench * _reciprocal_size(wrench.in_newtons(shrink)) for wrench in constraints),
         length=configuration.length,
         margin=balances.margin,
     )
@@ -103,11 +110,6 @@ def _loads_of_drives(leg: Leg, screws: LegScrews) -> list[tuple[Scalar, ...]]:
     """For each drive of a leg that holds something, its load per unit of each wrench of the leg."""
     pairs = zip(leg.springs, screws.loads, strict=True)
     return [row for spring, row in pairs if spring.actuated and not is_zero(spring.stiffness)]
-
-
-def _components_in_newtons(wrench: Wrench, shrink: Scalar) -> tuple[Scalar, ...]:
-    """The components of a wrench with its moment over the characteristic length, N; `shrink` is 1 over that, 1/m."""
-    return (*(wrench.rotational * shrink).components(), *wrench.translational.components())
 
 
 def _reciprocal_size(components: Sequence[Scalar]) -> Scalar:
@@ -315,7 +317,7 @@ def greatest_speed(drives: Transmission, speeds: Sequence[Scalar], block: slice)
     shrink, turning, structure = reciprocal(drives.length), block.start == 0, _forbidden_motions(drives, block)
     radius: Scalar = math.inf
     for wrench, speed in zip(drives.wrenches, speeds, strict=True):
-        size, felt = _allowed_size(_components_in_newtons(wrench, shrink), block, structure)
+        size, felt = _allowed_size(wrench.in_newtons(shrink), block, structure)
         needed = size * drives.length if turning else size
         radius = smaller(_reach(speed, needed, felt, math.inf), radius)
     return where(radius < math.inf, radius, math.nan)
@@ -324,7 +326,7 @@ def greatest_speed(drives: Transmission, speeds: Sequence[Scalar], block: slice)
 def _forbidden_motions(drives: Transmission, block: slice) -> Conjugated | None:
     """An orthonormal basis of the motions in a block that the structure does not allow; None where it allows all."""
     shrink = reciprocal(drives.length)
-    stopped = [list(_components_in_newtons(wrench, shrink)[block]) for wrench in drives.constraints]
+    stopped = [list(wrench.in_newtons(shrink)[block]) for wrench in drives.constraints]
     stopped = [column for column in stopped if not all(is_zero(c) for c in column)]
     return conjugate(stopped, [1.0] * 3, [1.0] * 3) if stopped else None
 
@@ -410,7 +412,7 @@ def greatest_speed_along(drives: Transmission, speeds: Sequence[Scalar], row: in
     rate: Scalar = math.inf
     for wrench, speed in zip(drives.wrenches, speeds, strict=True):
         part = abs(wrench.components()[row])
-        components = _components_in_newtons(wrench, shrink)
+        components = wrench.in_newtons(shrink)
         felt = components[row] * components[row] > UNREACHED_COMPONENT * total([c * c for c in components])
         rate = smaller(_reach(speed, part, felt, math.inf), rate)
     return _where_structure_allows(drives, row, rate)
@@ -419,6 +421,6 @@ def greatest_speed_along(drives: Transmission, speeds: Sequence[Scalar], row: in
 def _where_structure_allows(drives: Transmission, row: int, amount: Scalar) -> Scalar:
     """An amount of one component alone, or 0 where the structure forbids this motion."""
     for wrench in drives.constraints:
-        entry = _components_in_newtons(wrench, reciprocal(drives.length))[row]
+        entry = wrench.in_newtons(reciprocal(drives.length))[row]
         amount = where(entry * entry > UNREACHED_COMPONENT, 0.0, amount)
     return amount

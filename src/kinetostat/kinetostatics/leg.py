@@ -23,7 +23,6 @@ from kinetostat.algebra.scalar import (
 )
 from kinetostat.algebra.screw import NO_WRENCH, Screw, Wrench
 from kinetostat.algebra.solve import complement, conjugate, dual_basis
-from kinetostat.algebra.vector import Vector
 from kinetostat.frozen import dataclass
 from kinetostat.machine.leg_screws import LegScrews
 from kinetostat.tolerances import CLOSING_ROUND_OFF, DEPENDENT_LOADS
@@ -174,9 +173,8 @@ def modes_of(leg: LegScrews) -> Modes:
     combined, pivots = modes.columns, modes.pivots
     if all(map(is_bounded, leg.compliance)):
         pivots = [finite(pivot) for pivot in pivots]
-    halves = [(column[springs : springs + 3], column[springs + 3 :]) for column in combined]
     return Modes(
-        wrenches=tuple(Wrench(Vector(*moment), Vector(*force)) for moment, force in halves),
+        wrenches=tuple(Wrench.of(column[springs:]) for column in combined),
         loads=tuple(tuple(column[e] for column in combined) for e in range(springs)),
         compliance=tuple(pivots),
         mixing=tuple(tuple(row) for row in modes.shares),
@@ -269,4 +267,4 @@ def combine(screws: Sequence[AnyScrew], weights: Sequence[Scalar]) -> AnyScrew:
 
 def _either(condition: Scalar, a: Wrench, b: Wrench) -> Wrench:
     chosen = [where(condition, p, q) for p, q in zip(a.components(), b.components(), strict=True)]
-    return Wrench(Vector(*chosen[:3]), Vector(*chosen[3:]))
+    return Wrench.of(chosen)

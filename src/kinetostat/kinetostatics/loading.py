@@ -61,7 +61,7 @@ def deflection(statics: Statics, load: Wrench) -> Twist:
     endless = [twist.components() for twist, s in statics.motions if s == INFINITE and work_on_free(load, twist)]
     is_endless = [any(twist[i] for twist in endless) for i in range(SIZE)]
     components = [INFINITE if flag else amount for amount, flag in zip(amounts, is_endless, strict=True)]
-    return Twist(Vector(*components[:3]), Vector(*components[3:]))
+    return Twist.of(components)
 
 
 def held_compliance(statics: Statics) -> Symmetric6:

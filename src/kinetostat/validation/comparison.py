@@ -98,6 +98,7 @@ def difference(actual: Array, expected: Array, length: float, vanishing: float =
 
 
 INSTALL_ENGINE = "Install it with `{}`."
+"""A sentence for messages, with the command in it."""
 
 
 @dataclass(frozen=True)
@@ -314,12 +315,18 @@ def frequency_pairs(machine: Machine, engine: Engine) -> tuple[tuple[float, floa
 
 
 def _uncertainty(answer: Answer, ours: Array, length: float) -> float:
+    """Return the difference of an engine's two best results as a share of our C; infinite if it has only one."""
     if answer.second_best is None:
         return math.inf
     return max(block_differences(answer.second_best, answer.compliance, length, scale=ours).values())
 
 
 def _our_compliance(response: Response) -> Array:
+    """Return C by kinetostat [6 x 6].
+
+    Raises:
+        InputError: there is none at the pose, or it is 0, so that there is nothing to compare.
+    """
     status = Status(response.status)
     if status is not Status.OK:
         raise InputError(f"There is nothing to validate at this pose. {status.sentence}")

@@ -162,7 +162,7 @@ def written_legs(machine: Machine) -> list[MovingLeg]:
         for title, place in _copies(name, document.get(f"legs.{name}", {})):
             joints = [_entry_of_copy(entry, place) for entry in parts.values() if "type" in entry]
             links = {key: _entry_of_copy(entry, place) for key, entry in parts.items() if "model" in entry}
-            legs.append(_leg(title, joints, links, document))
+            legs.append(_moving_leg(title, joints, links, document))
     return legs
 
 
@@ -222,26 +222,26 @@ def _entry_of_copy(entry: Entry, place: Array) -> dict[str, Any]:
     return placed
 
 
-def _leg(name: str, joints: Sequence[Entry], links: Mapping[str, Entry], document: Entry) -> MovingLeg:
+def _moving_leg(name: str, joints: Sequence[Entry], links: Mapping[str, Entry], document: Entry) -> MovingLeg:
     """Return a leg: the parts of its first joint, then those of each link and of the joint behind it."""
-    parts = _joint(name, joints[0], document)
+    parts = _parts_of_joint(name, joints[0], document)
     bodies: list[LegBody] = []
     moves = False
     for joint, following in pairwise(joints):
         moves = moves or joint["type"] != "fixed"
         body = joint["joins"][1]
         link, ends = links.get(body, {}), (np.asarray(joint.get("far", joint["point"])), np.asarray(following["point"]))
-        springs = _link(PartName(name, body), link, ends, document)
+        springs = _parts_of_link(PartName(name, body), link, ends, document)
         if moves:
             of_struts = [other["section"] for other in joints if body in other["joins"] and "section" in other]
             section = next(iter([link["section"]] if "section" in link else of_struts), "")
             carriers = len(parts), len(parts) + len(springs)
             bodies.append(_body(f"{name} {body}", link, ends, carriers, document.get(f"sections.{section}")))
-        parts += [*springs, *_joint(name, following, document)]
+        parts += [*springs, *_parts_of_joint(name, following, document)]
     return MovingLeg(name, tuple(parts), tuple(bodies))
 
 
-def _joint(leg: str, joint: Entry, document: Entry) -> list[LegPart]:
+def _parts_of_joint(leg: str, joint: Entry, document: Entry) -> list[LegPart]:
     """Return the parts of a joint: its freedoms, of which one may have springs in a row and a rod, and its bearings."""
     name, kind = PartName(leg, joint["name"]), joint["type"]
     moving = [LegPart(element, moves=True) for element in _elements(name, joint)]
@@ -333,7 +333,7 @@ def _bearings(name: str, joint: Entry) -> Sequence[Spring]:
     return [Spring(f"{name} {kind}", freedom, k) for kind, k in stiffnesses.items() for freedom in freedoms[kind]]
 
 
-def _link(name: PartName, link: Entry, ends: tuple[Array, Array], document: Entry) -> list[LegPart]:
+def _parts_of_link(name: PartName, link: Entry, ends: tuple[Array, Array], document: Entry) -> list[LegPart]:
     """Return the parts that stand for a link that deflects."""
     model = link.get("model", "rigid")
     if model == "rigid":
@@ -379,7 +379,7 @@ def with_legs_of_file(machine: Machine, ours: Configuration) -> Configuration:
         place = PLATFORMS[kind](machine.tables["pose"])
     else:
         place = placement(columns(ours.platform.rotation), array(ours.platform.translation))
-    build = _crank if machine.family.name.endswith(CRANKS_SUFFIX) else _strut
+    build = _crank_leg if machine.family.name.endswith(CRANKS_SUFFIX) else _strut_leg
     ends = iter(zip(*_rings(machine, place), strict=True))
     legs, number = [], 0
     for leg in ours.legs:
@@ -402,28 +402,28 @@ def _rings(machine: Machine, place: Array) -> tuple[list[Array], list[Array]]:
     return rings[0], [apply(place, point) for point in rings[1]]
 
 
-def _drive(machine: Machine, number: int, freedom: Joint) -> list[Spring]:
+def _drive_springs(machine: Machine, number: int, freedom: Joint) -> list[Spring]:
     """Return the springs of an actuator: one, or those of its parts in a row."""
     series = machine.tables.get("stiffness.actuator")
     rows = [machine.tables["stiffness"].actuator] if series is None else list(vars(series).values())
     return [Spring("actuator", freedom, row[number], actuated=i == 0) for i, row in enumerate(rows)]
 
 
-def _elastic(freedom: Joint, rigidity: float, length: float, factor: float = 1.0) -> list[Spring]:
+def _link_springs(freedom: Joint, rigidity: float, length: float, factor: float = 1.0) -> list[Spring]:
     """Return a spring of a link over its whole length; none if it is rigid."""
     return [] if math.isinf(rigidity) else [Spring("link", freedom, factor * rigidity / length)]
 
 
-def _strut(machine: Machine, number: int, ends: tuple[Array, Array], _ours: Leg) -> Sequence[Element]:
+def _strut_leg(machine: Machine, number: int, ends: tuple[Array, Array], _ours: Leg) -> Sequence[Element]:
     """Return a slide between two spherical joints; of a planar machine, between two revolutes."""
     low, high = ends
     axes = (AXES[2],) if machine.family.planar else AXES
     along, length = Joint(vector(unit(high - low))), float(np.linalg.norm(high - low))
-    rod = _elastic(along, float(machine.tables["stiffness"].leg_axial), length)
-    return [*_ball(low, axes), *_drive(machine, number, along), *rod, *_ball(high, axes)]
+    rod = _link_springs(along, float(machine.tables["stiffness"].leg_axial), length)
+    return [*_ball(low, axes), *_drive_springs(machine, number, along), *rod, *_ball(high, axes)]
 
 
-def _crank(machine: Machine, number: int, ends: tuple[Array, Array], ours: Leg) -> Sequence[Element]:
+def _crank_leg(machine: Machine, number: int, ends: tuple[Array, Array], ours: Leg) -> Sequence[Element]:
     """Return a crank in a vertical plane and a rod, with its elbow on the side where kinetostat has it."""
     (low, high), geometry, stiffness = ends, machine.tables["geometry"], machine.tables["stiffness"]
     side = turn(Z, geometry.crank_turn[number]) @ unit([low[0], low[1], 0.0])
@@ -438,12 +438,12 @@ def _crank(machine: Machine, number: int, ends: tuple[Array, Array], ours: Leg) 
     pivot, sideways = Joint(vector(axis), vector(low)), Joint(vector(np.cross(axis, unit(elbow - low))), vector(low))
     along = Joint(vector(unit(high - elbow)))
     bending = [
-        *_elastic(pivot, stiffness.crank_bending, crank, BENDING_OF_TIP),
-        *_elastic(sideways, stiffness.crank_bending, crank, BENDING_OF_TIP),
+        *_link_springs(pivot, stiffness.crank_bending, crank, BENDING_OF_TIP),
+        *_link_springs(sideways, stiffness.crank_bending, crank, BENDING_OF_TIP),
     ]
-    stretch = _elastic(along, stiffness.leg_axial, rod)
+    stretch = _link_springs(along, stiffness.leg_axial, rod)
     bar = Arm(vector(low), vector(elbow))
-    return [*_drive(machine, number, pivot), *bending, bar, *_ball(elbow, AXES), *stretch, *_ball(high, AXES)]
+    return [*_drive_springs(machine, number, pivot), *bending, bar, *_ball(elbow, AXES), *stretch, *_ball(high, AXES)]
 
 
 def _ball(centre: Array, axes: Sequence[Vector]) -> list[Joint]:
