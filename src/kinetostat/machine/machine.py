@@ -28,6 +28,11 @@ from kinetostat.spec.requirements import Requirement
 from kinetostat.spec.tolerance_table import Tolerance
 from kinetostat.units import KINDS, UnitError
 
+BASE_FRAME = Displacement(IDENTITY, ZERO)
+"""The base frame, placed in itself."""
+POSE_DIGITS = 6
+"""Digits of a coordinate of the pose: people have written it themselves, and look for what they wrote."""
+
 
 @dataclass(frozen=True)
 class Closure:
@@ -43,9 +48,6 @@ class Closure:
     span: Scalar
     shortest: Scalar
     longest: Scalar
-
-
-BASE_FRAME = Displacement(IDENTITY, ZERO)
 
 
 @dataclass(frozen=True)
@@ -413,10 +415,6 @@ def _wrench(table: Any) -> Wrench:
 def springs(configuration: Configuration) -> list[Spring]:
     """All springs of the machine, leg by leg: the order of every per-spring result."""
     return [spring for leg in configuration.legs for spring in leg.springs]
-
-
-POSE_DIGITS = 6
-"""Digits of a coordinate, which people have written themselves."""
 
 
 def frame_of(machine: Machine, axes: str = "base") -> str:

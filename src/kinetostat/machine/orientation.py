@@ -21,7 +21,9 @@ from kinetostat.units import UnitError
 NEWTON_STEPS = 4
 """Steps to the nearest rotation: an error of `ROUNDED_ORIENTATION` is round-off after three, and one is to spare."""
 ANGLES = ("roll", "pitch", "yaw")
+"""Coordinates of a pose that say how the platform is turned."""
 TILT = ("azimuth", "angle", "torsion")
+"""Angles of a tilt; the torsion may be left out, and is then 0."""
 FORMS = {
     "quaternion": "[w, x, y, z] of length 1, e.g. [0.9962, 0.0872, 0, 0] for 10 deg about x",
     "rotation": "three rows, the axes of the platform in their columns, e.g. [[1, 0, 0], [0, 1, 0], [0, 0, 1]]",
@@ -61,7 +63,8 @@ def from_parts(form: str, parts: Mapping[str, Array]) -> Any:
     Raises:
         InputError: a part has no column (only the torsion of a tilt may be left out), or they differ in length.
     """
-    missing = [part for part in PARTS[form] if part not in parts and part != "torsion"]
+    *_, torsion = TILT
+    missing = [part for part in PARTS[form] if part not in parts and part != torsion]
     if missing:
         raise InputError(
             f"the poses have a column {form}.{next(iter(parts))}, but no {form}.{missing[0]}; give a column for each "
@@ -138,7 +141,7 @@ def _of_matrices(value: object, where: str) -> Array:
 
 
 def _of_tilts(value: object, where: str) -> Array:
-    if not isinstance(value, Mapping) or not {"azimuth", "angle"} <= value.keys() <= set(TILT):
+    if not isinstance(value, Mapping) or not set(TILT[:2]) <= value.keys() <= set(TILT):
         raise InputError(f"{where} is {shorten(value)}; give {FORMS['tilt']} (torsion may be left out: 0).")
     parts = {"torsion": 0.0, **value}
     azimuth, angle, torsion = _of_one_length([_angle_values(parts[name], f"{where}.{name}") for name in TILT], where)

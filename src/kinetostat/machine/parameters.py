@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
+from operator import itemgetter
 from typing import Any, Protocol, TypeVar
 
 from kinetostat.algebra.scalar import Scalar
@@ -91,15 +92,16 @@ class Parameter:
 
 
 AXES = ("x", "y", "z")
+"""Names of the entries of a vector."""
 VECTORS = (
     "offset", "moment", "force", "gravity", "gravity_axis", "centre_of_mass", "payload_centre", "point", "axis",
     "first_axis", "second_axis", "far", "direction",
 )  # fmt: skip
 """Fields whose entries are along x, y, z."""
 TENSOR = ("xx", "yy", "zz", "xy", "xz", "yz")
-"""Entries of an inertia tensor."""
+"""Names of the entries of an inertia tensor."""
 TENSORS = ("inertia", "payload_inertia")
-"""Fields whose entries are these."""
+"""Fields that are inertia tensors."""
 
 
 def names_entries(field: str) -> bool:
@@ -130,6 +132,7 @@ def named_entry(path: str) -> str:
 
 
 POSE = "pose."
+"""Beginning of the paths of coordinates of the pose."""
 
 
 def shown(path: str) -> str:
@@ -327,17 +330,13 @@ def check_contrast(machine: HasNumbers, origin: str) -> None:
     ]
     if not elastic:
         return
-    (soft, softest, low), (hard, stiffest, high) = min(elastic, key=_first), max(elastic, key=_first)
+    (soft, softest, low), (hard, stiffest, high) = (extreme(elastic, key=itemgetter(0)) for extreme in (min, max))
     if hard > CONTRAST * soft:
         raise InputError(
             f'"{origin}": {softest} is {low.quantity.show(soft)} and {stiffest} {high.quantity.show(hard)}; '
             f"stiffnesses of one machine may differ by a factor of {CONTRAST:g} at most: write 0 for what is free, "
             f'"{RIGID}" for what is rigid.'
         )
-
-
-def _first(entry: tuple[float, str, Parameter]) -> float:
-    return entry[0]
 
 
 def doubts(machine: HasNumbers) -> Iterator[str]:

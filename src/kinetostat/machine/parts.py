@@ -9,7 +9,7 @@ Points and axes are in the base frame.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from kinetostat.algebra.scalar import Scalar, is_infinite, is_zero, reciprocal
 from kinetostat.algebra.vector import AXES, Z_AXIS, Displacement, Vector
@@ -54,6 +54,14 @@ def in_series(stiffness: Scalar, rigidity: Scalar, length: Scalar, factor: float
     return stiffness if is_infinite(rigidity) else series(stiffness, per_length(rigidity, length, factor))
 
 
+class BarRigidity(NamedTuple):
+    """E I and G J of a bar, N·m², and its length, m."""
+
+    bending: Scalar
+    torsion: Scalar
+    length: Scalar
+
+
 def bent_links(lengths: Sequence[Scalar], stiffness: Sequence[Scalar], bending: Sequence[Scalar]) -> list[Scalar]:
     """Return the rotational stiffness, N·m/rad, of each joint in series with the link that is clamped to it.
 
@@ -63,14 +71,7 @@ def bent_links(lengths: Sequence[Scalar], stiffness: Sequence[Scalar], bending: 
 
 
 def built_in_bar(
-    name: str,
-    axes: Iterable[Vector],
-    point: Vector,
-    stiffness: Sequence[Scalar],
-    *,
-    bending: Scalar,
-    torsion: Scalar,
-    length: Scalar,
+    name: str, axes: Iterable[Vector], point: Vector, stiffness: Sequence[Scalar], bar: BarRigidity
 ) -> tuple[Spring, ...]:
     """Return the springs of a bar at the end where it is built in: bending about two axes and torsion about the third.
 
@@ -81,12 +82,11 @@ def built_in_bar(
         axes: x and y across the bar, and z along it, base frame.
         point: the point of that end, base frame, m.
         stiffness: the stiffness of its seat about these axes, N·m/rad.
-        bending, torsion: E I and G J of the bar, N·m².
-        length: the length of the bar, m.
+        bar: the rigidities and the length of the bar.
     """
-    deflections = (("bending x", bending, 3.0), ("bending y", bending, 3.0), ("torsion", torsion, 1.0))
+    deflections = (("bending x", bar.bending, 3.0), ("bending y", bar.bending, 3.0), ("torsion", bar.torsion, 1.0))
     return tuple(
-        Spring(f"{name} {deflection}", Joint(axis, point), in_series(k, rigidity, length, factor))
+        Spring(f"{name} {deflection}", Joint(axis, point), in_series(k, rigidity, bar.length, factor))
         for (deflection, rigidity, factor), axis, k in zip(deflections, axes, stiffness, strict=True)
     )
 

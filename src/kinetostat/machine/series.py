@@ -23,6 +23,10 @@ from kinetostat.units import KINDS
 MOST_PARTS = 12
 """Parts that a series may have: a drive has some five between motor and platform, so that more is a mistake."""
 
+SeriesKeys = tuple[tuple[str, tuple[str, ...]], ...]
+"""Fields of [stiffness] that are series, each with the keys of its parts."""
+
+# A name that begins with a letter, then its stiffness: a number with a unit, or "rigid".
 _PART = re.compile(r"\s*([^\W\d_][^.]*?)[\s:]+([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?:\s*[^\d\s].*)?|rigid)\s*")
 
 
@@ -45,15 +49,15 @@ def parts(value: object, where: str) -> dict[str, object]:
     entries = list(value.items()) if isinstance(value, dict) else [_entry(e, where) for e in _list(value, where)]
     if not 1 <= len(entries) <= MOST_PARTS:
         raise InputError(f"{where} has {len(entries)} parts; a series has 1 to {MOST_PARTS}.")
-    named: dict[str, object] = {}
+    by_key: dict[str, object] = {}
     for name, stiffness in entries:
         key = re.sub(r"\W+", "_", name)
         if not key.isidentifier() or keyword.iskeyword(key) or key.startswith("_") or len(key) > LONGEST_NAME:
             raise InputError(f'{where}: {shorten(name)} cannot name a part; write a short name, e.g. "ball screw".')
-        if key in named:
+        if key in by_key:
             raise InputError(f'{where}: two parts are called "{label(key)}"; give each a name of its own.')
-        named[key] = stiffness
-    return named
+        by_key[key] = stiffness
+    return by_key
 
 
 def label(key: str) -> str:
@@ -61,31 +65,22 @@ def label(key: str) -> str:
     return key.replace("_", " ")
 
 
-def springs_in_a_row(spring: Spring, named: Sequence[tuple[str, Scalar]], joint: str = "") -> tuple[Spring, ...]:
+def springs_in_a_row(spring: Spring, row: Sequence[tuple[str, Scalar]], joint: str = "") -> tuple[Spring, ...]:
     """Springs on one freedom in the place of a spring on it; the first of them is the one that its servo drives.
 
     Args:
         spring: the spring whose place they take; its `part_name` knows the leg.
-        named: key and stiffness of each part, N/m or N·m/rad.
+        row: key and stiffness of each part, N/m or N·m/rad.
         joint: name of the joint, which comes before that of the part; empty to leave it out.
     """
-    row = []
-    for number, (key, stiffness) in enumerate(named):
-        title = f"{joint} {label(key)}".strip()
-        part = spring.part_name
+    springs: list[Spring] = []
+    for key, stiffness in row:
+        title, part = f"{joint} {label(key)}".strip(), spring.part_name
         name = PartName(part.leg, title) if isinstance(part, PartName) else f"{part} {label(key)}"
-        is_first = number == 0
-        row.append(
-            replace(
-                spring,
-                name=name,
-                part=name,
-                stiffness=stiffness,
-                actuated=spring.actuated and is_first,
-                hinge=spring.hinge and is_first,
-            )
-        )
-    return tuple(row)
+        is_first = not springs
+        actuated, hinge = spring.actuated and is_first, spring.hinge and is_first
+        springs.append(replace(spring, name=name, part=name, stiffness=stiffness, actuated=actuated, hinge=hinge))
+    return tuple(springs)
 
 
 def _list(value: object, where: str) -> list[object]:
@@ -115,32 +110,34 @@ def with_named_parts(document: Document, family: Family, origin: str) -> Documen
     stiffness = document.get("stiffness")
     if not isinstance(stiffness, dict):
         return document
-    fields = {key: value for key, value in stiffness.items() if key in _stiffnesses(family) and is_series(value)}
+    fields = {key: value for key, value in stiffness.items() if key in _stiffness_fields(family) and is_series(value)}
     for key in fields:
         if not key.endswith("actuator"):
             raise InputError(
                 f'"{origin}": stiffness.{key} is {shorten(fields[key])}; only an actuator is a series of parts, '
                 "because they must carry one load along one freedom."
             )
-    named = {key: parts(value, f'"{origin}": stiffness.{key}') for key, value in fields.items()}
-    return {**document, "stiffness": {**stiffness, **named}}
+    tables = {key: parts(value, f'"{origin}": stiffness.{key}') for key, value in fields.items()}
+    return {**document, "stiffness": {**stiffness, **tables}}
 
 
 def family_with_parts(family: Family, document: Document) -> Family:
     """The family whose machine files have a number for each part of the series in a document; itself without any."""
     stiffness = document.get("stiffness")
     fields = stiffness.items() if isinstance(stiffness, dict) else ()
-    series = tuple((key, tuple(value)) for key, value in fields if key in _stiffnesses(family) and is_series(value))
+    known = _stiffness_fields(family)
+    series = tuple((key, tuple(value)) for key, value in fields if key in known and is_series(value))
     return _family_with_parts(family, series) if series else family
 
 
-def _stiffnesses(family: Family) -> set[str]:
+def _stiffness_fields(family: Family) -> set[str]:
+    """The fields of [stiffness] that are stiffnesses, and not rigidities of links."""
     known = quantities(family.tables["stiffness"])
     return {name for name, quantity in known.items() if KINDS[quantity.kind].name.endswith("stiffness")}
 
 
 @lru_cache(KEPT_FAMILIES)
-def _family_with_parts(family: Family, series: tuple[tuple[str, tuple[str, ...]], ...]) -> Family:
+def _family_with_parts(family: Family, series: SeriesKeys) -> Family:
     stiffness_table = family.tables["stiffness"]
     known, in_parts = quantities(stiffness_table), dict(series)
     single = {
@@ -165,10 +162,14 @@ def _family_with_parts(family: Family, series: tuple[tuple[str, tuple[str, ...]]
 
 
 class SeriesStiffness(tuple[tuple[str, Scalar], ...]):
-    """Key and stiffness of the parts of a series, where a family has the stiffness of one actuator."""
+    """Key and stiffness of the parts of a series, in the place of the stiffness of one actuator.
+
+    A family passes the stiffness of an actuator on to its spring and computes nothing with it. So this goes through its
+    `configure` as a number would, and the spring that has got it is then replaced by those of the parts.
+    """
 
 
-def _configuration(family: Family, series: tuple[tuple[str, tuple[str, ...]], ...], **tables: Any) -> Configuration:
+def _configuration(family: Family, series: SeriesKeys, **tables: Any) -> Configuration:
     """The machine at its pose, with the parts of each series as springs in the place of one."""
     stiffness_table = family.tables["stiffness"]
     known, stiffnesses = quantities(stiffness_table), dict(vars(tables["stiffness"]))

@@ -169,7 +169,10 @@ class Quantity:
         kind = KINDS[self.kind]
         cross_section = ["object"] if self.stiff else []
         single = {"type": ["number", "string", *cross_section], "examples": [kind.example]}
-        rule = f"{self.meaning}; a {kind.name} with its unit, or a bare number in {kind.unit}"
+        form = (
+            f"a {kind.name} with its unit, or a bare number in {kind.unit}" if kind.unit else "a number without a unit"
+        )
+        rule = f"{self.meaning}; {form}"
         rule += f', or "{RIGID}"' if self.stiff else ""
         rule += f', or "{NO_LIMIT}"' if self.unset is not None else ""
         if self.count is None:

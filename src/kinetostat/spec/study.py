@@ -29,6 +29,7 @@ Written: TypeAlias = float | str
 Path: TypeAlias = Annotated[str, Field(min_length=1, max_length=200)]
 Method: TypeAlias = Literal["genetic", "gradient", "hybrid", "nsga2"]
 OVER = "worst, mean or percentile P"
+"""Words for what is taken over all poses, or over all machines that manufacture makes."""
 
 
 class StudyTable(BaseModel):
@@ -248,19 +249,15 @@ def _hint(path: Sequence[str]) -> str:
     return f" ({entry})" if entry != "it is needed" else ""
 
 
-TABLES = ("set", "poses", "optimizer", "robustness")
-LISTS = ("variables", "objectives", "constraints")
-
-
 def study_toml(study: StudyFile) -> str:
     """Return the TOML text of a study; what is as it would be without being written is left out."""
     content = study.model_dump(mode="json", by_alias=True, exclude_defaults=True)
     lines = [f"schema = {study.schema_version}", *toml_pairs({key: content[key] for key in ("name", "machine")})]
     lines += _table("[set]", content.get("set", {}))
-    for name in LISTS:
+    for name in ("variables", "objectives", "constraints"):
         for table in content.get(name, []):
             lines += _table(f"[[{name}]]", table)
-    for name in TABLES[1:]:
+    for name in ("poses", "optimizer", "robustness"):
         lines += _table(f"[{name}]", content.get(name, {}))
     lines += requirement_lines(study.requirements)
     return "\n".join(lines) + "\n"

@@ -97,8 +97,8 @@ def _range_of(size: float, ends: Sequence[float], name: str) -> int:
 TABLE = "tolerances"
 MOST_LINES = 200
 """Lines of the table at most: one for each number of a large machine, so that more are a mistake."""
-MOST_VALUES = 3
-"""Values of a line: one for each kind of number, length, angle and ratio."""
+MOST_DEVIATIONS = 3
+"""Values of a line: one for each kind of number, length, angle and share."""
 LINE_WIDTH = 120
 """Characters of a name or a value."""
 SIGMAS = 3.0
@@ -282,8 +282,8 @@ def _tolerance(about: str, value: object, place: str) -> Tolerance:
         raise InputError(f"{place} has no field {shorten(unknown[0])}; it may have {' and '.join(LINE_KEYS)}.")
     entries = table.get("tolerance")
     texts = entries if isinstance(entries, list | tuple) else [entries]
-    if not 0 < len(texts) <= MOST_VALUES:
-        raise InputError(f"{place} has {len(texts)} values; give 1 to {MOST_VALUES}: {TOLERANCE_FORM}.")
+    if not 0 < len(texts) <= MOST_DEVIATIONS:
+        raise InputError(f"{place} has {len(texts)} values; give 1 to {MOST_DEVIATIONS}: {TOLERANCE_FORM}.")
     deviations = tuple(_deviation(text, place) for text in texts)
     for kind in LARGEST_TOLERANCE:
         if sum(deviation.fits(kind) for deviation in deviations) > 1:
@@ -351,7 +351,7 @@ def _amount(text: str, written: object, place: str) -> tuple[str, float]:
 def tolerances_schema() -> dict[str, Any]:
     """Return the JSON Schema of the table."""
     text: dict[str, Any] = {"type": "string", "examples": ["0.05 mm", "sigma 0.02 mm", "IT7 at 300 mm", "20 um/m"]}
-    value = {"anyOf": [text, {"type": "array", "items": text, "minItems": 1, "maxItems": MOST_VALUES}]}
+    value = {"anyOf": [text, {"type": "array", "items": text, "minItems": 1, "maxItems": MOST_DEVIATIONS}]}
     cost = {"type": "number", "minimum": COSTS[0], "maximum": COSTS[1], "description": "relative cost of making it so"}
     table = {"type": "object", "properties": {"tolerance": value, "cost": cost}, "required": ["tolerance"]}
     return {

@@ -105,20 +105,22 @@ def family_text(family: Family) -> str | None:
     return f"{recipe.__module__}.{recipe.__qualname__}({parts})"
 
 
-def _of_machine(machine: Machine) -> tuple[Any, ...]:
+def _pickled_machine(machine: Machine) -> tuple[Any, ...]:
     """A function that makes a machine again, and its arguments, as pickle takes them."""
     content = {field.name: getattr(machine, field.name) for field in fields(machine)}
-    return _machine, ({**content, "tables": {name: dict(vars(table)) for name, table in machine.tables.items()}},)
+    return _unpickled_machine, (
+        {**content, "tables": {name: dict(vars(table)) for name, table in machine.tables.items()}},
+    )
 
 
-def _machine(content: Mapping[str, Any]) -> Machine:
+def _unpickled_machine(content: Mapping[str, Any]) -> Machine:
     """Put a machine together again."""
     classes = content["family"].every_table
     tables = {name: classes[name](**numbers) for name, numbers in content["tables"].items()}
     return Machine(**{**content, "tables": tables})
 
 
-def _of_family(family: Family) -> tuple[Any, ...]:
+def _pickled_family(family: Family) -> tuple[Any, ...]:
     """The recipe by which a family is made again, or the look-up of its name, as pickle takes them."""
     if family.recipe is not None:
         return family.recipe
@@ -135,5 +137,5 @@ def _family_by_name(name: str) -> Family:
     return family
 
 
-copyreg.pickle(Machine, _of_machine)
-copyreg.pickle(Family, _of_family)
+copyreg.pickle(Machine, _pickled_machine)
+copyreg.pickle(Family, _pickled_family)

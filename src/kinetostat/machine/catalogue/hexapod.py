@@ -55,17 +55,8 @@ def hexapod_platform(geometry: Geometry, _stiffness: Stiffness, pose: Pose) -> P
     No pose is out of reach: strokes are limits, which are compared elsewhere.
     """
     platform = Displacement(rotation_of_angles(pose.roll, pose.pitch, pose.yaw), Vector(pose.x, pose.y, pose.z))
-    return Placement(
-        platform,
-        leg_ends(
-            geometry,
-            geometry.base_angles,
-            geometry.platform_angles,
-            platform,
-            base_height=geometry.base_height,
-            platform_height=geometry.platform_height,
-        ),
-    )
+    heights = geometry.base_height, geometry.platform_height
+    return Placement(platform, leg_ends(geometry, geometry.base_angles, geometry.platform_angles, platform, *heights))
 
 
 FAMILIES = with_struts_or_cranks(

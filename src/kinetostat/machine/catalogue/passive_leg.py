@@ -26,7 +26,7 @@ from kinetostat.algebra.vector import (
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, Spring, revolutes
 from kinetostat.machine.links import LinkKind, from_origin, of_passive_leg
 from kinetostat.machine.machine import Closure
-from kinetostat.machine.parts import bent_links, built_in_bar, servo
+from kinetostat.machine.parts import BarRigidity, bent_links, built_in_bar, servo
 from kinetostat.machine.rings import (
     LegEnds,
     Placement,
@@ -277,15 +277,8 @@ def ram_platform(geometry: RamGeometry, stiffness: RamStiffness, pose: RamPose) 
     pitch = rotation_y(cos(pose.theta1), sin(pose.theta1))
     tip = Vector(0.0, 0.0, pose.z)
     platform = Displacement(pitch @ rotation_x(cos(pose.theta2), sin(pose.theta2)), tip)
-    springs = built_in_bar(
-        "ram",
-        AXES,
-        ZERO,
-        stiffness.ram,
-        bending=stiffness.ram_bending,
-        torsion=stiffness.ram_torsion,
-        length=abs(pose.z),
-    )
+    bar = BarRigidity(stiffness.ram_bending, stiffness.ram_torsion, abs(pose.z))
+    springs = built_in_bar("ram", AXES, ZERO, stiffness.ram, bar)
     slide = servo(Joint(Z_AXIS, None, "ram slide"), "ram actuator", stiffness.ram_actuator)
     leg = Leg("ram", (*springs, slide, *revolutes(tip, (Y_AXIS, pitch.x), "ram Hooke joint")))
     return Placement(platform, leg_ends(geometry, geometry.base_angles, geometry.platform_angles, platform), (leg,))
@@ -327,15 +320,8 @@ def tube_platform(geometry: TubeGeometry, stiffness: TubeStiffness, pose: TubePo
     pitch = rotation_y(cos(pose.theta1), sin(pose.theta1))
     turn = pitch @ rotation_x(cos(pose.theta2), sin(pose.theta2))
     platform = Displacement(turn, turn.z * pose.length)
-    springs = built_in_bar(
-        "tube",
-        (turn.x, turn.y, turn.z),
-        platform.translation,
-        stiffness.tube,
-        bending=stiffness.tube_bending,
-        torsion=stiffness.tube_torsion,
-        length=pose.length,
-    )
+    bar = BarRigidity(stiffness.tube_bending, stiffness.tube_torsion, pose.length)
+    springs = built_in_bar("tube", (turn.x, turn.y, turn.z), platform.translation, stiffness.tube, bar)
     slide = servo(Joint(turn.z, None, "tube slide"), "tube actuator", stiffness.tube_actuator)
     leg = Leg("tube", (*revolutes(ZERO, (Y_AXIS, pitch.x), "tube Hooke joint"), slide, *springs))
     return Placement(platform, leg_ends(geometry, geometry.base_angles, geometry.platform_angles, platform), (leg,))

@@ -13,6 +13,7 @@ Source: theory (73)-(75); R. M. Murray, Z. Li and S. S. Sastry, A Mathematical I
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 from kinetostat.algebra.scalar import Scalar, is_zero, reciprocal, sqrt, where
 from kinetostat.algebra.vector import (
@@ -33,9 +34,20 @@ LEAST_SHARE = 1e-6
 """Share of its greatest value that a branch's sign needs at the home pose: else the leg stands between two branches."""
 
 
-_ClosedArm = tuple[list[Scalar | Turn], Displacement, Closure, Scalar]
-"""Coordinates of the joints before the ball, the displacement of the arm that they carry, the condition for the single
-joint to reach, and the square of what the pair misses."""
+class _ClosedArm(NamedTuple):
+    """The three joints before the ball, in closed form.
+
+    Attributes:
+        amounts: their coordinates.
+        motion: the displacement of the arm that they carry.
+        closure: the condition for the single joint to reach.
+        gap: the square of what the pair misses.
+    """
+
+    amounts: list[Scalar | Turn]
+    motion: Displacement
+    closure: Closure
+    gap: Scalar
 
 
 @dataclass(frozen=True)
@@ -102,9 +114,9 @@ class BallLeg:
         ball = movers[3:]
         centre = ball[0].pivot
         before_ball = self._close_pair_first if self.pair_first else self._close_single_first
-        amounts, arm, closure, gap = before_ball(movers[:3], centre, motion.apply(centre))
-        ball_turns, ball_gap = _ball_turns(ball, arm.rotation, motion.apply(centre), motion)
-        return ClosedLeg([*amounts, *ball_turns], closure, gap + ball_gap)
+        arm = before_ball(movers[:3], centre, motion.apply(centre))
+        ball_turns, ball_gap = _ball_turns(ball, arm.motion.rotation, motion.apply(centre), motion)
+        return ClosedLeg([*arm.amounts, *ball_turns], arm.closure, arm.gap + ball_gap)
 
     def _close_pair_first(self, movers: Sequence[Joint], centre: Vector, goal: Vector) -> _ClosedArm:
         """The single joint puts the ball at its distance from the pair, and the pair turns the arm between them."""
@@ -120,7 +132,7 @@ class BallLeg:
         pair_motion = _placement_of(turns[1]).motion
         arm = pair_motion @ single_motion
         amounts = [*turns, _with_placement(amount, single, pair_motion, arm)]
-        return amounts, arm, Closure(self.leg, sqrt(square), *limits), gap
+        return _ClosedArm(amounts, arm, Closure(self.leg, sqrt(square), *limits), gap)
 
     def _close_single_first(self, movers: Sequence[Joint], centre: Vector, goal: Vector) -> _ClosedArm:
         """The single joint carries the pair; seen from the pair, it puts the goal at the distance of the ball."""
@@ -136,7 +148,7 @@ class BallLeg:
         single_motion = single.motion_by(amount)[1]
         turns = [_displaced_turn(single_motion, turn) for turn in turns]
         amounts = [_with_placement(amount, single, single_motion, single_motion), *turns]
-        return amounts, _placement_of(turns[1]).motion, Closure(self.leg, sqrt(square), *limits), gap
+        return _ClosedArm(amounts, _placement_of(turns[1]).motion, Closure(self.leg, sqrt(square), *limits), gap)
 
     def _pair(self, pair: Sequence[Joint], start: Vector, end: Vector, home: Vector) -> tuple[list[Turn], Scalar]:
         """Turns of the pair that take one unit vector to another (theory (74)), and the square of what they miss.

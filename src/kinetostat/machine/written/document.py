@@ -289,16 +289,16 @@ def _leg(
     joints = with_directions(joints, where)
     plans = tuple(_joint(key, part, f'{where}, joint "{key}"', shapes) for key, part in joints.items())
     check_chain(name, plans, legs, where)
-    for place, plan in enumerate(plans):
-        if plan.rod:
-            check_strut(plans, place, f'{where}, joint "{plan.name}"')
+    for place, joint in enumerate(plans):
+        if joint.rod:
+            check_strut(plans, place, f'{where}, joint "{joint.name}"')
     bodies = {plan.joins[1] for plan in plans[:-1]}
     for key in links:
         choice(key, bodies, f"{where}: links name")
-    plan = LegPlan(name, plans, {key: _link(key, links[key], f'{where}, link "{key}"', shapes) for key in links})
+    link_plans = {key: _link(key, links[key], f'{where}, link "{key}"', shapes) for key in links}
     numbers = {key: _without(part, JOINT_WORDS) for key, part in joints.items()}
     masses = {key: _without(part, LINK_WORDS) for key, part in links.items()}
-    return plan, {**numbers, **{key: fields for key, fields in masses.items() if fields}}
+    return LegPlan(name, plans, link_plans), {**numbers, **{key: fields for key, fields in masses.items() if fields}}
 
 
 def _joint(name: str, part: dict[str, Any], where: str, shapes: Mapping[str, str]) -> JointPlan:

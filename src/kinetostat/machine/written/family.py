@@ -6,7 +6,7 @@ Which coordinates close the chains at a pose is found in `kinematics.closure`. P
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial, reduce
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
 from kinetostat.algebra.vector import IDENTITY, ZERO, Displacement, Vector
@@ -199,11 +199,20 @@ def _moving(leg: LegPlan, joint: JointPlan, data: Any, plan: Plan, tables: Mappi
     freedom = cast(Joint, elements[place])  # only a joint can be sprung: a parallelogram has no motor
     name = f"{title} actuator" if joint.actuated else f"{title} hinge"
     stiffness = 0.0 if joint.series else data.stiffness
-    spring = Spring(name, freedom, stiffness, title, joint.actuated, not joint.actuated)
-    row = [replace(spring, preload=data.preload if joint.preloaded else 0.0, acts=joint.acts)]
+    spring = Spring(
+        name,
+        freedom,
+        stiffness,
+        part=title,
+        actuated=joint.actuated,
+        hinge=not joint.actuated,
+        preload=data.preload if joint.preloaded else 0.0,
+        acts=joint.acts,
+    )
+    row = [spring]
     if joint.series:
         parts = tables[f"{leg.table(joint.name)}.stiffness"]
-        row = [*springs_in_a_row(row[0], [(key, getattr(parts, key)) for key in joint.series], joint.name)]
+        row = [*springs_in_a_row(spring, [(key, getattr(parts, key)) for key in joint.series], joint.name)]
     if not joint.actuated:
         whole = reduce(series, [each.stiffness for each in row])
         row = [replace(each, return_stiffness=whole) for each in row]
@@ -249,8 +258,12 @@ def members(plan: Plan, joints: Sequence[Scalar | Turn] | None = None, **tables:
     return links
 
 
-Carrier = tuple[Displacement, int, int]
-"""Displacement of a link from the home pose, and how many elements of its leg carry its beginning and its end."""
+class Carrier(NamedTuple):
+    """The place of a link: its displacement from the home pose, and how many elements of its leg carry either end."""
+
+    motion: Displacement
+    elements_to_start: int
+    elements_to_end: int
 
 
 def _carriers(
@@ -262,7 +275,7 @@ def _carriers(
     for moving, flexible in _parts_at_home(plan, leg, tables):
         motion = place([replace(s, element=s.element.displaced(motion)) for s in moving], joints)[1] @ motion
         carried += len(moving) + len(flexible)
-        carriers.append((motion, carried - len(flexible), carried))
+        carriers.append(Carrier(motion, carried - len(flexible), carried))
     return carriers
 
 
@@ -290,7 +303,7 @@ def _member(
         if carrier is not None and "centre_of_mass" in link.weight:
             centre = partial(_station, carrier, direction_in(leg, weight.centre_of_mass))
         if carrier is not None and "inertia" in link.weight:
-            inertia = partial(turned_tensor, carrier[0].rotation.apply, inertia_in(leg, weight.inertia))
+            inertia = partial(turned_tensor, carrier.motion.rotation.apply, inertia_in(leg, weight.inertia))
     return Member(
         leg=leg.name,
         name=f"{leg.name} {body}",
@@ -305,13 +318,12 @@ def _member(
 
 
 def _stations(carrier: Carrier, ends: tuple[Vector, Vector]) -> tuple[Station, ...]:
-    motion, first, last = carrier
-    return (first, motion.apply(ends[0])), (last, motion.apply(ends[1]))
+    start, end = (carrier.motion.apply(point) for point in ends)
+    return (carrier.elements_to_start, start), (carrier.elements_to_end, end)
 
 
 def _station(carrier: Carrier, point: Vector) -> Station:
-    motion, first, _ = carrier
-    return first, motion.apply(point)
+    return carrier.elements_to_start, carrier.motion.apply(point)
 
 
 def _section(leg: LegPlan, body: str) -> str:
