@@ -23,7 +23,19 @@ from kinetostat.studies.analysis_parts import Indices
 from kinetostat.views import analysis_tables as free
 from kinetostat.views.analysis_tables import first_lines
 from kinetostat.views.forward import actuator_coordinates
-from kinetostat.views.question import FIRST_FIELDS, MESSAGE, NAME, Description, Field, Lines, Option, Question, Records
+from kinetostat.views.question import (
+    FIRST_FIELDS,
+    MESSAGE,
+    NAME,
+    REQUIREMENTS,
+    Description,
+    Field,
+    Lines,
+    Option,
+    Question,
+    Records,
+    requirements_met,
+)
 
 if TYPE_CHECKING:
     from kinetostat.equilibrium import solving
@@ -221,7 +233,7 @@ ANALYSIS = Description(
         _index_field("eigenscrews", attrgetter("eigenscrews")),
         Field("softest"),
         Field("along", "directions"),
-        Field("requirements", lambda analysis: analysis.requirements or None, optional=True),
+        REQUIREMENTS,
         Field("mobility", lambda analysis: _mobility(analysis.mobility)),
         Field("internal_loads"),
         Field("load"),
@@ -233,7 +245,7 @@ ANALYSIS = Description(
     lines=first_lines,
     tables=lambda analysis, full: _filled_parts(_free_parts(analysis, full)),
     answered=lambda analysis: analysis.status is Status.OK,
-    kept=lambda analysis: all(verdict.met for verdict in analysis.requirements),
+    kept=requirements_met,
     undrawn="analyze draws figures of the machine under load only; add --loaded, or leave -o out.",
 )
 SPRING = (  # values of each spring of a loaded machine
@@ -273,9 +285,7 @@ LOADED = Description(
     figures="views.loaded.loaded_figures",
     state=lambda state: f"under load: {state.rest.word}",
     answered=lambda state: state.has_rest,
-    kept=lambda state: (
-        state.rest is not solving.Rest.JOINT_LIMIT and all(verdict.met for verdict in state.requirements)
-    ),
+    kept=lambda state: state.rest is not solving.Rest.JOINT_LIMIT and requirements_met(state),
 )
 ANALYZE_QUESTION = Question(
     example='kinetostat analyze mine.toml --set pose.x="5 mm" --json',

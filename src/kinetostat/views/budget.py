@@ -35,6 +35,7 @@ from kinetostat.views.budget_forms import (
     ranked_by,
     varied_fields,
 )
+from kinetostat.views.data_forms import status_words
 from kinetostat.views.question import MESSAGE, NAME, Description, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table, text_table
 
@@ -257,7 +258,7 @@ BUDGET = Description(
         Field("tolerances", _text_by_line),
         Field("measures", lambda answer: dict(zip(answer.measures, answer.units, strict=True))),
         Field("leading_measure", "leading"),
-        Field("status", lambda answer: [Status(code).word for code in answer.status.tolist()]),
+        Field("status", lambda answer: status_words(answer.status)),
         Field("poses", lambda answer: {path: values for path, (values, _) in varied_fields(answer).items()}),
         Field("errors", lambda answer: {s: _by_measure(answer, getattr(answer.spread, s)) for s in STATISTICS}),
         Field("usual_everywhere", lambda a: dict(zip(a.measures, a.spread.everywhere.tolist(), strict=True))),

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from kinetostat.kinematics.status import Status
 from kinetostat.late import LateModule
 from kinetostat.machine.machine import setting_of
+from kinetostat.machine.parameters import data_name
 from kinetostat.studies.budget import STATISTICS, Budget
 from kinetostat.studies.datasets import ABOUT_POSES, ABOUT_STATUS, origin_of
 from kinetostat.units import KINDS
-from kinetostat.views.data_forms import columns_csv
+from kinetostat.views.data_forms import column_head, columns_csv, status_words
 from kinetostat.views.question import Drawing
 
 if TYPE_CHECKING:
@@ -75,13 +75,12 @@ def poses_csv(answer: Budget) -> str | None:
     if len(answer.status) == 1:
         return None
     columns: dict[str, Any] = {"pose": range(1, len(answer.status) + 1)}
-    columns |= {
-        f"{path.removeprefix('pose.')} [{unit}]": values for path, (values, unit) in varied_fields(answer).items()
-    }
-    columns["status"] = [Status(code).word for code in answer.status.tolist()]
+    varied = varied_fields(answer).items()
+    columns |= {column_head(data_name(path), unit): values for path, (values, unit) in varied}
+    columns["status"] = status_words(answer.status)
     for statistic in STATISTICS:
         for measure, unit in zip(answer.measures, answer.units, strict=True):
-            columns[f"{statistic} {measure} [{unit}]"] = answer.size(statistic, measure)
+            columns[column_head(f"{statistic} {measure}", unit)] = answer.size(statistic, measure)
     return columns_csv(columns)
 
 

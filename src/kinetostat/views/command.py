@@ -17,7 +17,7 @@ from kinetostat.machine.parameters import Parameter, data_name
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.commanding import Command, command
 from kinetostat.studies.corrections import CorrectionTable, Term, correction_table
-from kinetostat.views.data_forms import columns_csv
+from kinetostat.views.data_forms import column_head, columns_csv, status_words
 from kinetostat.views.forward import coordinate_text
 from kinetostat.views.question import LAW_TOLERANCE, MESSAGE, NAME, Description, Field, Lines, Option, Question
 from kinetostat.views.tables import FittedTable, numeric_table
@@ -76,11 +76,11 @@ def command_csv(answer: Command, corrections: bool = False) -> str:
     columns: dict[str, Any] = {"pose": range(1, len(answer.coordinates) + 1)}
     if answer.poses is not None:
         for field, values in zip(answer.poses.fields, answer.poses.values, strict=True):
-            columns[f"{data_name(field.path)} [{field.unit}]"] = values
+            columns[column_head(data_name(field.path), field.unit)] = values
     tables = {"": answer.coordinates} | ({" correction": answer.corrections} if corrections else {})
     for suffix, table in tables.items():
         for name, unit, values in zip(answer.actuators, answer.units, table.T, strict=True):
-            columns[f"{name}{suffix} [{unit}]"] = np.where(answer.settled, values, np.nan)
+            columns[column_head(f"{name}{suffix}", unit)] = np.where(answer.settled, values, np.nan)
     return columns_csv(columns)
 
 
@@ -96,7 +96,7 @@ COMMAND = Description(
         Field("error_before", "distance_uncorrected"),
         Field("error_left", "distance_corrected"),
         Field("rotation_left", "rotation_corrected"),
-        Field("status", lambda answer: [Status(code).word for code in answer.status.tolist()]),
+        Field("status", lambda answer: status_words(answer.status)),
     ),
     lines=lambda answer: [("Commands", answer.message)],
     tables=lambda answer, _full: [(_single_pose_table if len(answer.coordinates) == 1 else _poses_table)(answer)],

@@ -13,7 +13,8 @@ import numpy as np
 
 from kinetostat.algebra.screw import Screw
 from kinetostat.algebra.vector import Vector
-from kinetostat.arrays import AnyArray
+from kinetostat.arrays import AnyArray, Codes
+from kinetostat.kinematics.status import Status
 from kinetostat.late import LateModule
 from kinetostat.spec.renamed import RENAMED, with_former_keys
 from kinetostat.views.question import Description, Field, Records
@@ -74,6 +75,16 @@ def _nested_lists(values: AnyArray) -> Any:
 def finite_or_none(value: float) -> float | None:
     """Return a number for files, in which None stands for what has no end or is not known."""
     return value if math.isfinite(value) else None
+
+
+def status_words(codes: Codes) -> list[str]:
+    """Return the statuses of poses in words."""
+    return [Status(code).word for code in codes.tolist()]
+
+
+def column_head(name: str, unit: str) -> str:
+    """Return the head of a column of numbers in a CSV file, "x [m]"; a number without a unit has its name alone."""
+    return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
 def stiffness_of_spring(stiffness: float | None) -> float | str | None:

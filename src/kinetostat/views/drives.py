@@ -24,9 +24,21 @@ from kinetostat.studies.motion_deflection import ModesAlong
 from kinetostat.studies.requirements import motor_requirements
 from kinetostat.tolerances import ROUND_OFF_OF_ENTRY
 from kinetostat.units import load_unit, motion_unit
-from kinetostat.views.data_forms import columns_csv
+from kinetostat.views.data_forms import column_head, columns_csv
 from kinetostat.views.motors import PER_MINUTE, curves_of, name_drives, note_motion, speed_torque_figure
-from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question, Records
+from kinetostat.views.question import (
+    FIRST_FIELDS,
+    REQUIREMENTS,
+    Axis,
+    Description,
+    Drawing,
+    Field,
+    Lines,
+    Option,
+    Question,
+    Records,
+    requirements_met,
+)
 from kinetostat.views.tables import FittedTable, numeric_table
 
 if TYPE_CHECKING:
@@ -259,7 +271,7 @@ def curves_csv(answer: DriveLoads) -> str | None:
         return None
     curves, columns = answer.curves, {"time [s]": answer.motion.times}
     columns |= answer.motion.path.pose
-    columns |= {f"{name} [{load['units']}]": load["values"] for name, load in answer.motion.loads.items()}
+    columns |= {column_head(name, load["units"]): load["values"] for name, load in answer.motion.loads.items()}
     for k, drive in enumerate(answer.drives):
         unit = motion_unit(not drive.slides)
         values_of_all = (
@@ -271,7 +283,7 @@ def curves_csv(answer: DriveLoads) -> str | None:
             ("power", "W", curves.power),
             ("net energy", "J", curves.net_energy),
         )
-        columns |= {f"{drive.name} {name} [{of_values}]": values[k] for name, of_values, values in values_of_all}
+        columns |= {column_head(f"{drive.name} {name}", si): values[k] for name, si, values in values_of_all}
     return columns_csv(columns)
 
 
@@ -335,7 +347,7 @@ DRIVES = Description(
             "m",
             "greatest swing of the tool point after the end",
         ),
-        Field("requirements", lambda a: a.requirements or None, optional=True),
+        REQUIREMENTS,
         Field("greatest_deflection", lambda a: a.greatest_deflection and a.greatest_deflection[0], "m"),
         Records(
             "drives",
@@ -401,7 +413,7 @@ DRIVES = Description(
         Axis("component", lambda _a: np.array(COMPONENTS)),
     ),
     answered=lambda answer: bool(answer.drives),
-    kept=lambda answer: all(verdict.met for verdict in answer.requirements),
+    kept=requirements_met,
     files={"drives.json": "json", "drives.csv": "csv", "drives.nc": "nc", "curves.csv": curves_csv},
 )
 

@@ -19,11 +19,12 @@ from kinetostat.machine.machine import pose_of, setting_of
 from kinetostat.studies.elevation import USUAL_RANGE, Elevation, elevation
 from kinetostat.units import component_units, load_unit
 from kinetostat.views.command import correction_lines, correction_tables, law_fields
-from kinetostat.views.data_forms import columns_csv
+from kinetostat.views.data_forms import column_head, columns_csv, status_words
 from kinetostat.views.loaded import KINDS_OF_LOADS, use_of_limit
 from kinetostat.views.question import (
     FIRST_FIELDS,
     LAW_TOLERANCE,
+    REQUIREMENTS,
     Axis,
     Description,
     Drawing,
@@ -32,6 +33,7 @@ from kinetostat.views.question import (
     Option,
     Question,
     Records,
+    requirements_met,
 )
 from kinetostat.views.tables import FittedTable, numeric_table, text_table
 
@@ -186,13 +188,13 @@ def _reversals_table(answer: Elevation) -> FittedTable:
 def elevation_csv(answer: Elevation) -> str:
     """Write all numbers over the elevation as CSV in SI: a row for each, with loads and corrections of actuators."""
     columns: dict[str, Any] = {"elevation [rad]": answer.elevations}
-    columns["status"] = [Status(code).word for code in answer.statuses.tolist()]
-    columns |= {f"{name} [{unit}]": values for name, (unit, values) in _columns(answer, full=True).items()}
+    columns["status"] = status_words(answer.statuses)
+    columns |= {column_head(name, unit): values for name, (unit, values) in _columns(answer, full=True).items()}
     for name, turning, values in zip(answer.actuators, answer.turning, answer.loads.T, strict=True):
-        columns[f"{name} load [{load_unit(turning)}]"] = values
+        columns[column_head(f"{name} load", load_unit(turning))] = values
     commands = answer.corrections.command
     for name, unit, values in zip(commands.actuators, commands.units, commands.corrections.T, strict=True):
-        columns[f"{name} correction [{unit}]"] = values
+        columns[column_head(f"{name} correction", unit)] = values
     return columns_csv(columns)
 
 
@@ -300,7 +302,7 @@ ELEVATION = Description(
         *FIRST_FIELDS,
         Field("components"),
         Field("elevation", "elevations", "rad", forms=("json",)),
-        Field("statuses", lambda answer: [Status(code).word for code in answer.statuses.tolist()], forms=("json",)),
+        Field("statuses", lambda answer: status_words(answer.statuses), forms=("json",)),
         Field("displacement", unit="rad, m", long_name="rotation vector and displacement of the tool point",
               axes=("elevation", "component")),
         Field("sag", unit="m", long_name="displacement of the tool point by the loads", axes=("elevation",)),
@@ -322,7 +324,7 @@ ELEVATION = Description(
         Field("correction", lambda answer: answer.corrections.command.corrections, "m, rad",
               "what is added to each actuator", axes=("elevation", "driven")),
         Field("law", lambda answer: law_fields(answer.corrections), forms=("json",)),
-        Field("requirements", lambda answer: answer.requirements or None, optional=True, forms=("json",)),
+        REQUIREMENTS,
     ),
     lines=_lines,
     tables=_tables,
@@ -336,7 +338,7 @@ ELEVATION = Description(
     makers={"csv": elevation_csv},
     state=lambda answer: f"over elevation: {answer.status.word}",
     answered=lambda answer: bool(np.isfinite(answer.sag).any()),
-    kept=lambda answer: answer.status is Status.OK and all(verdict.met for verdict in answer.requirements),
+    kept=lambda answer: answer.status is Status.OK and requirements_met(answer),
     files={"elevation.json": "json", "elevation.csv": elevation_csv, "elevation.nc": "nc"},
 )  # fmt: skip
 ELEVATION_QUESTION = Question(

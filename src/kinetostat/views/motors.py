@@ -20,7 +20,18 @@ from kinetostat.studies.drives import DriveCurves, DriveLoads, root_mean_square
 from kinetostat.studies.motors import MotorCandidate, MotorChoice, motors
 from kinetostat.studies.requirements import motor_requirements
 from kinetostat.units import load_unit
-from kinetostat.views.question import FIRST_FIELDS, Description, Drawing, Field, Lines, Option, Question, Records
+from kinetostat.views.question import (
+    FIRST_FIELDS,
+    REQUIREMENTS,
+    Description,
+    Drawing,
+    Field,
+    Lines,
+    Option,
+    Question,
+    Records,
+    requirements_met,
+)
 from kinetostat.views.tables import FittedTable, numeric_table
 
 if TYPE_CHECKING:
@@ -208,7 +219,7 @@ MOTORS = Description(
     title="Motors along the motion",
     fields=(
         *FIRST_FIELDS,
-        Field("requirements", lambda choice: choice.requirements or None, optional=True),
+        REQUIREMENTS,
         Records(
             "motors",
             "motor",
@@ -229,7 +240,7 @@ MOTORS = Description(
     tables=_tables,
     figures=_figures,
     answered=lambda answer: bool(answer.candidates),
-    kept=lambda answer: all(verdict.met for verdict in answer.requirements),
+    kept=requirements_met,
     files={"motors.json": "json", "motors.csv": "csv"},
 )
 MOTORS_QUESTION = Question(

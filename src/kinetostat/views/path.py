@@ -22,7 +22,7 @@ from kinetostat.machine.parameters import data_name, named_entry
 from kinetostat.studies.evaluation import PoseAnswers, answers_at
 from kinetostat.studies.poses import read_poses
 from kinetostat.studies.quantities import usual_quantities
-from kinetostat.views.data_forms import csv_text
+from kinetostat.views.data_forms import column_head, csv_text, status_words
 from kinetostat.views.question import (
     DISPLACED,
     LOADS_LEFT_OUT,
@@ -51,8 +51,8 @@ FIGURE_WIDTH, ROOM_FOR_TITLE = 6.6, 0.7
 """Width of the figure, and height of its title and notes, inches."""
 QUANTITY_HEIGHT, COORDINATE_HEIGHT = 1.9, 1.25
 """Height of a panel of quantities, and of one of coordinates, which only say where the machine is; inches."""
-NO_RESULT_COLOUR = "#dddddd"
-"""Colour behind poses that have no result."""
+STRIP_COLOUR = "#dddddd"
+"""Grey of strips behind poses that have no result: darker than on maps, because strips are narrow."""
 MOST_DOTS = 60
 """Number of poses up to which each is marked with a dot: more would run into a line."""
 Curves = dict[str, Array]
@@ -116,17 +116,13 @@ def _csv(answer: PoseAnswers) -> str:
     """
     columns: dict[str, Sequence[Any]] = {"pose": range(1, answer.poses.count + 1)}
     for field, values in zip(answer.poses.fields, answer.poses.values, strict=True):
-        columns[_column_head(data_name(field.path), field.unit)] = values.tolist()
-    columns["status"] = [Status(code).word for code in answer.status.tolist()]
+        columns[column_head(data_name(field.path), field.unit)] = values.tolist()
+    columns["status"] = status_words(answer.status)
     for name, values in answer.values.items():
-        columns[_column_head(name, QUANTITIES[name].unit)] = [
+        columns[column_head(name, QUANTITIES[name].unit)] = [
             "" if math.isnan(value) else value for value in values.tolist()
         ]
     return csv_text(columns, zip(*columns.values(), strict=True))
-
-
-def _column_head(name: str, unit: str) -> str:
-    return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
 def path_figures(answer: PoseAnswers) -> dict[str, Drawing]:
@@ -190,7 +186,7 @@ def _shade(panel: "Axes", numbers: Integers) -> None:
     """Shade the poses of these numbers; neighbours share one strip."""
     for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1):
         if len(run):
-            panel.axvspan(run[0] - 0.5, run[-1] + 0.5, color=NO_RESULT_COLOUR, linewidth=0.0)
+            panel.axvspan(run[0] - 0.5, run[-1] + 0.5, color=STRIP_COLOUR, linewidth=0.0)
 
 
 def _notes(answer: PoseAnswers) -> tuple[str, str, str]:
@@ -209,7 +205,7 @@ PATH = Description(
         Field("variables", _variables),
         Field("matrices", lambda answer: {name: answer.matrix(name) for name in answer.matrices}),
         Field("components", "machine.family.component_names"),
-        Field("status", lambda answer: [Status(code).word for code in answer.status.tolist()]),
+        Field("status", lambda answer: status_words(answer.status)),
     ),
     lines=_lines,
     tables=_tables,

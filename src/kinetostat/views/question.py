@@ -79,6 +79,13 @@ FIRST_FIELDS = (NAME, STATUS, MESSAGE)
 """Fields with which answers about a machine begin: its name, and the status of its pose in a word and in a sentence."""
 LOADS_LEFT_OUT = Field("loads_left_out", forms=("json",))
 """The sentence on loads of the file that do not count: an answer with this field shows it on all surfaces."""
+REQUIREMENTS = Field("requirements", lambda answer: answer.requirements or None, optional=True)
+"""Verdicts on the requirements of the file; a file without them has no such key."""
+
+
+def requirements_met(answer: Any) -> bool:
+    """Return whether an answer keeps all requirements of its file, as a `Description` asks."""
+    return all(verdict.met for verdict in answer.requirements)
 
 
 @dataclass(frozen=True)

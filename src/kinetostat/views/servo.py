@@ -3,7 +3,8 @@
 import math
 from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from kinetostat.late import LateModule
 from kinetostat.machine.machine import pose_of, setting_of
 from kinetostat.studies.control import Servo, servo
 from kinetostat.vibration.receptance import ASSUMED_RATIO, along, receptance
+from kinetostat.vibration.servo import ServoLoop
 from kinetostat.views.data_forms import finite_or_none
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question, Records
 from kinetostat.views.tables import FittedTable, numeric_table
@@ -32,9 +34,17 @@ SAME_SHARE = 1e-9
 """Relative difference up to which two stiffnesses are the same: beyond round-off, and below any digit shown."""
 
 
-def _share_at_rest(drive: dict[str, Any]) -> float:
-    """Return the stiffness of a drive at 0 Hz over that of its transmission."""
-    return float(drive["static"] / drive["transmission"])
+class DriveWithLoop(NamedTuple):
+    """A drive by its name, the unit of its stiffnesses, and its servo loop."""
+
+    name: str
+    unit: str
+    loop: ServoLoop
+
+    @property
+    def share_at_rest(self) -> float:
+        """Stiffness of the drive at 0 Hz over that of its transmission."""
+        return self.loop.static_stiffness / self.loop.transmission
 
 
 def _lines(answer: Servo) -> Lines:
@@ -43,15 +53,16 @@ def _lines(answer: Servo) -> Lines:
         return
     yield "Pose", f"{pose_of(answer.machine)}."
     yield "Servo", answer.message
-    softest = min(_drives(answer), key=_share_at_rest)
-    static, transmission = (_stiffness(answer, softest[key], softest["unit"]) for key in ("static", "transmission"))
+    softest = min(_drives(answer), key=attrgetter("share_at_rest"))
+    stiffnesses = softest.loop.static_stiffness, softest.loop.transmission
+    static, transmission = (_stiffness(answer, stiffness, softest.unit) for stiffness in stiffnesses)
     verb = "is" if static == RIGID else "holds"
     if len(set(answer.loops.loops)) == 1:
         yield "Drive", f"Each drive {verb} {static} at 0 Hz; its transmission has {transmission}."
-    elif _share_at_rest(softest) > 1.0 - SAME_SHARE:
+    elif softest.share_at_rest > 1.0 - SAME_SHARE:
         yield "Drives", "At 0 Hz each drive holds what its transmission does, or more."
     else:
-        loss = f"{softest['name']} loses most by its loop: it {verb} {static} at 0 Hz"
+        loss = f"{softest.name} loses most by its loop: it {verb} {static} at 0 Hz"
         yield "Drives", f"{loss}; its transmission has {transmission}."
     if answer.assumed:
         ratio = number(100.0 * ASSUMED_RATIO)
@@ -79,34 +90,31 @@ def _stiffness(answer: Servo, value: float, unit: str) -> str:
 
 def _table_of_drives(answer: Servo) -> FittedTable:
     table = numeric_table("Drives", "", ["transmission", "Kv", "Tn", "at the load", "loop closed, 0 Hz"])
-    for drive in _drives(answer):
-        transmission, static = (_stiffness(answer, drive[key], drive["unit"]) for key in ("transmission", "static"))
-        integral = f"{number(1e3 * drive['integral_time'])} ms" if drive["integral_time"] else DASH
-        gain, share = f"{number(drive['position_gain'])} 1/s", f"{number(100.0 * drive['at_load'])} %"
-        table.add_row(drive["name"], transmission, gain, integral, share, static)
+    for name, unit, loop in _drives(answer):
+        transmission, static = (_stiffness(answer, k, unit) for k in (loop.transmission, loop.static_stiffness))
+        integral = f"{number(1e3 * loop.integral_time)} ms" if loop.integral_time else DASH
+        gain, share = f"{number(loop.position_gain)} 1/s", f"{number(100.0 * loop.at_load)} %"
+        table.add_row(name, transmission, gain, integral, share, static)
     return table
 
 
-def _drives(answer: Servo) -> list[dict[str, Any]]:
-    """Return the numbers of each drive by name: its unit, those of its loop, and its stiffness at rest."""
+def _drives(answer: Servo) -> list[DriveWithLoop]:
+    """Return the drives with their loops; none without an answer."""
     if answer.loops is None:
         return []
     return [
-        {
-            "name": str(drive.name),
-            "unit": stiffness_unit(drive.turning),
-            **vars(loop),
-            "static": loop.static_stiffness,
-        }
+        DriveWithLoop(str(drive.name), stiffness_unit(drive.turning), loop)
         for drive, loop in zip(answer.loops.modes.drives, answer.loops.loops, strict=True)
     ]
 
 
 def _records_of_drives(answer: Servo) -> list[dict[str, Any]]:
-    """Return the numbers of each drive for files."""
+    """Return the numbers of each drive for files, by the names of its loop's attributes."""
     return [
-        {key: finite_or_none(value) if isinstance(value, float) else value for key, value in drive.items()}
-        for drive in _drives(answer)
+        {"name": name, "unit": unit}
+        | {key: finite_or_none(value) for key, value in vars(loop).items()}
+        | {"static": finite_or_none(loop.static_stiffness)}
+        for name, unit, loop in _drives(answer)
     ]
 
 

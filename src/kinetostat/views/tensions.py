@@ -88,8 +88,13 @@ def _figure(answer: Tensions, title: str = "{}: tensions of the cables") -> "Fig
     return figure
 
 
+def _has_tensions(answer: Tensions) -> bool:
+    """Return whether the cables hold the load: all of them have a tension then, and none otherwise."""
+    return answer.cables[0].tension is not None
+
+
 def _figures(answer: Tensions) -> dict[str, Drawing]:
-    if any(cable.tension is None for cable in answer.cables):
+    if not _has_tensions(answer):
         return {}
     return {"tensions": Drawing("Tension of each cable, and the bounds that are near.", partial(_figure, answer))}
 
@@ -123,7 +128,7 @@ TENSIONS = Description(
     lines=_lines,
     tables=_tables,
     figures=_figures,
-    answered=lambda answer: answer.cables[0].tension is not None,
+    answered=_has_tensions,
     files={"tensions.json": "json", "tensions.csv": "csv", "tensions.nc": "nc"},
 )
 TENSIONS_QUESTION = Question(
