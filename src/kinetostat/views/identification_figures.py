@@ -25,6 +25,10 @@ LEAST_PATH_WIDTH = 1.4
 """Least room for these paths, inches."""
 MATRIX_SIZES, UNKNOWN_SIZE = (2.5, 9.0), 0.14
 """Least and greatest side of the matrix of correlations, and what an unknown adds to it, a line of its path; inches."""
+FIGURE_WIDTH, RESIDUAL_HEIGHT, PLACES_HEIGHT = 6.4, 2.3, 3.6
+"""Width of the figures of residuals and of places, height of a row of residuals, and of the places; inches."""
+ROOM_FOR_TITLE, ROOM_BESIDE_MATRIX = 0.7, (0.8, 0.2)
+"""Height of title and notes of the residuals; width of the bar beside a matrix, and height of its title; inches."""
 LEAST_HEIGHT = 0.3
 """Least height of a panel of places as a share of its width: places on a bed lie on a line, seen from the front."""
 ROOM_ABOVE_RESIDUALS, OUTLIER_PLACE = 1.3, 0.94
@@ -41,8 +45,8 @@ FIT_CAPTIONS = {
 
 def identification_figures(answer: Identification) -> dict[str, Drawing]:
     """Return the drawings of an identification, by name."""
-    draw = {"residuals": residual_figure, "correlations": correlation_figure, "poses": pose_figure}
-    return {name: Drawing(caption, partial(draw[name], answer)) for name, caption in FIT_CAPTIONS.items()}
+    figures = {"residuals": residual_figure, "correlations": correlation_figure, "poses": pose_figure}
+    return {name: Drawing(FIT_CAPTIONS[name], partial(draw, answer)) for name, draw in figures.items()}
 
 
 def residual_figure(answer: Identification, title: str = "{}: what is left of the measurements") -> Figure:
@@ -55,7 +59,10 @@ def residual_figure(answer: Identification, title: str = "{}: what is left of th
     kinds = [(rows, turning) for rows, turning in ((~turns, False), (turns, True)) if rows.any()]
     outlier_note = "outliers stand at the edge of a panel where they lie beyond it" if answer.outliers else ""
     with new_figure(
-        (6.4, 2.3 * len(kinds) + 0.7), title.format(answer.machine.name), "measured less computed", outlier_note
+        (FIGURE_WIDTH, RESIDUAL_HEIGHT * len(kinds) + ROOM_FOR_TITLE),
+        title.format(answer.machine.name),
+        "measured less computed",
+        outlier_note,
     ) as figure:
         panels = figure.subplots(len(kinds), 2, squeeze=False, sharex=True)
         for row, (rows, turning) in zip(panels, kinds, strict=True):
@@ -100,7 +107,8 @@ def correlation_figure(answer: Identification, title: str = "{}: numbers that we
     named = answer.unknowns if len(matrix) <= MOST_PATHS else ()
     names = [unknown.path.removeprefix("legs.").replace(".", " ") for unknown in named]
     path_width = max(LEAST_PATH_WIDTH, width_of(names, PATH_SIZE))
-    with new_figure((size + path_width + 0.8, size + path_width + 0.2), title.format(answer.machine.name)) as figure:
+    width, height = (size + path_width + room for room in ROOM_BESIDE_MATRIX)
+    with new_figure((width, height), title.format(answer.machine.name)) as figure:
         panel = figure.subplots()
         image = panel.imshow(matrix, cmap="RdBu_r", vmin=-1.0, vmax=1.0, interpolation="nearest")
         panel.grid(visible=False)
@@ -115,7 +123,7 @@ def pose_figure(answer: Identification, title: str = "{}: commanded places of th
     """Draw the commanded tool points, from above and from the front, and the poses to be measured next."""
     scale = answer.machine.display.scale("m")
     tool = answer.observed.model.drawn.tool * scale.factor
-    with new_figure((6.4, 3.6), title.format(answer.machine.name)) as figure:
+    with new_figure((FIGURE_WIDTH, PLACES_HEIGHT), title.format(answer.machine.name)) as figure:
         for panel, (view, across, up) in zip(figure.subplots(1, 2), (("plan", 0, 1), ("front", 0, 2)), strict=True):
             panel.plot(tool[:, across], tool[:, up], ".", color=COLOURS[0], label="measured")
             if answer.next is not None and {"pose.x", "pose.y", "pose.z"} <= answer.next.poses.keys():

@@ -51,6 +51,14 @@ ROOM_FOR_TITLE = 0.9
 """Height that its title and its labels take, inches."""
 WIDTH_ALONE, WIDTH_AMONG_OTHERS, FRONT_HEIGHT = 4.2, 3.1, 3.2
 """Width of the panel of a pair of objectives, alone and among others, and its height, inches."""
+CONVERGENCE_SIZE = (6.8, 3.0)
+"""Width and height of the figure of convergence, inches: two panels side by side on a page."""
+HISTOGRAM_HEIGHT, HISTOGRAM_MARGIN = 2.9, 0.6
+"""Height of the figure of histograms with its title, and width of its margins, inches."""
+NOMINAL_COLOUR = "#222222"
+"""Nearly black of the value of the best design as it is drawn."""
+BAR_SHARE = 0.6
+"""Height of a bar of the gains as a share of its line."""
 PALE_GREY = "#cccccc"
 """Colour of what stands behind the result: designs beside a front, and the scale of a variable."""
 MIDDLE_GREY = "#777777"
@@ -78,7 +86,7 @@ def convergence(log: Log, title: str) -> Figure:
     across = "descent" if log.problem.method == "gradient" else "generation"
     steps = np.arange(1, len(log.steps) + 1)
     best, mean = (np.array([step.get(key, np.nan) for step in log.steps], dtype=float) for key in ("best", "mean"))
-    with new_figure((6.8, 3.0), title) as figure:
+    with new_figure(CONVERGENCE_SIZE, title) as figure:
         left, right = figure.subplots(1, 2)
         scale = log.problem.machine.display.scale(objective.term.unit)
         left.plot(steps, mean * scale.factor, color=COLOURS[1], label="mean of the population", linestyle="--")
@@ -113,7 +121,7 @@ def _draw_gains(panel: Axes, result: Result) -> None:
     ]
     places, gains = np.arange(len(compared)), np.array([direction.gain for direction in compared])
     colours = [COLOURS[2] if gain >= 1.0 else COLOURS[1] for gain in gains]
-    panel.barh(places, gains - 1.0, left=1.0, color=colours, height=0.6)
+    panel.barh(places, gains - 1.0, left=1.0, color=colours, height=BAR_SHARE)
     panel.axvline(1.0, color=GUIDE_COLOUR, linewidth=0.8)
     is_wide = gains.size and gains.max() / gains.min() > WIDEST_LINEAR_RATIO
     panel.set(xscale="log" if is_wide else "linear", xlabel="times as stiff as before")
@@ -192,7 +200,7 @@ def front(result: Result, title: str) -> Figure:
 def tolerances(result: Result, title: str) -> Figure:
     """Draw how each objective scatters over random machines within the tolerances of the best design."""
     scatters = result.robustness.scatters if result.robustness else ()
-    with new_figure((HISTOGRAM_WIDTH * len(scatters) + 0.6, 2.9), title) as figure:
+    with new_figure((HISTOGRAM_WIDTH * len(scatters) + HISTOGRAM_MARGIN, HISTOGRAM_HEIGHT), title) as figure:
         for panel, scatter in zip(figure.subplots(1, len(scatters), squeeze=False).flat, scatters, strict=True):
             _histogram(panel, scatter, result.problem.machine.display)
     return figure
@@ -204,7 +212,7 @@ def _histogram(panel: Axes, scatter: Scatter, display: Display) -> None:
     panel.hist(samples * scale.factor, bins=BINS, color=COLOURS[5], edgecolor="white", linewidth=0.3)
     usual = f"reached by {100.0 * COMMON_SHARE:g} %"
     marks = (("nominal", scatter.nominal, "-"), (usual, scatter.usual, "--"), ("worst", scatter.worst, ":"))
-    for (label, value, dash), colour in zip(marks, ("#222222", COLOURS[0], COLOURS[1]), strict=True):
+    for (label, value, dash), colour in zip(marks, (NOMINAL_COLOUR, COLOURS[0], COLOURS[1]), strict=True):
         panel.axvline(value * scale.factor, color=colour, linestyle=dash, label=f"{label}: {value * scale.factor:.6g}")
     panel.set(xlabel=scale.label(scatter.label), ylabel="machines")
     panel.margins(x=0.03)

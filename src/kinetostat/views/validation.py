@@ -51,6 +51,15 @@ LEAST_SHOWN_SHARE = 5e-4
 """Share of the variance up to which a source is not named: it would read 0.0 %."""
 MOST_BARS_OF_ENTRIES = 60
 """Greatest number of measured entries that have bars; of more, those with the largest differences."""
+FIGURE_WIDTH, ROW_HEIGHT, ROOM_FOR_TITLE = 6.4, 0.2, 1.9
+"""Width of the figure of differences, height of a row, and of title, legend, scale and notes, inches."""
+BAR_SHARE = 0.6
+"""Height of a bar as a share of its row: names of entries are told apart."""
+EXPLAINED_COLOUR = "#e8e8e8"
+"""Pale grey of the band of differences that uncertainties explain."""
+LEAST_REACH, ROOM_BEYOND_BARS = 1.5, 1.1
+"""Half the width of the panel of differences at least, in half widths of that band; and over the greatest bar: the band
+is seen to end, and no bar does."""
 
 
 def verdict(validation: Validation) -> str:
@@ -112,16 +121,12 @@ def _pose(validation: Validation) -> dict[str, float]:
     return {path.removeprefix("pose."): value for path, value in numbers.items() if path.startswith("pose.")}
 
 
-def _components(_validation: Validation) -> list[str]:
-    return list(COMPONENTS)
-
-
 VALIDATION = Description(
     title="Validation",
     fields=(
         NAME,
         Field("pose", _pose),
-        Field("components", _components),
+        Field("components", lambda _validation: list(COMPONENTS)),
         Field("engine"),
         Field("version"),
         Field("ours", long_name=f"{COMPLIANCE_UNITS}, by kinetostat", axes=ROW_AND_COLUMN),
@@ -150,7 +155,7 @@ VALIDATION = Description(
     ),
     lines=lambda validation: [("Verdict", verdict(validation)), ("Engine", REBUILT)],
     tables=_engine_tables,
-    axes=tuple(Axis(name, _components) for name in ROW_AND_COLUMN),
+    axes=tuple(Axis(name, lambda _validation: list(COMPONENTS)) for name in ROW_AND_COLUMN),
     state=lambda validation: f"compared with an independent engine, {validation.engine} {validation.version}",
 )
 
@@ -198,7 +203,7 @@ def verdict_of(row: "MeasuredRow", display: Display) -> str:
     if row.explained:
         return "explained"
     low, high = row.bounds
-    size = abs(row.entry.value)
+    size = abs(row.entry.value)  # as measured
     if size <= measured_stiffness.COVERAGE_FACTOR * row.u_data:
         scale = _scale(row, display)
         ends = f"{number(low * scale.factor, digits=2)} to {number(high * scale.factor, digits=2)} {scale.unit}"
@@ -240,7 +245,7 @@ def measured_figure(answer: "MeasuredComparison", title: str = "{}: measured and
     order = np.sort(np.argsort(-np.abs(differences), kind="stable")[:MOST_BARS_OF_ENTRIES])
     rows = [answer.rows[n] for n in order]
     with figures.new_figure(
-        (6.4, 1.9 + 0.2 * len(rows)),
+        (FIGURE_WIDTH, ROOM_FOR_TITLE + ROW_HEIGHT * len(rows)),
         title.format(answer.machine.name),
         setting_of(answer.machine),
         "grey: explained by uncertainties",
@@ -256,13 +261,21 @@ def measured_figure(answer: "MeasuredComparison", title: str = "{}: measured and
 
 
 def _draw_differences(panel: "Axes", rows: Sequence["MeasuredRow"], differences: Array, greatest: float) -> None:
-    """Draw a bar for each row with its difference in standard uncertainties, over the band that these explain."""
-    panel.axvspan(-measured_stiffness.COVERAGE_FACTOR, measured_stiffness.COVERAGE_FACTOR, color="#e8e8e8", zorder=0)
+    """Draw a bar for each row with its difference in standard uncertainties, over the band that these explain.
+
+    Args:
+        panel: the panel to fill.
+        rows: the rows that are shown.
+        differences: their differences [rows].
+        greatest: the greatest size of the differences of all rows, also of those that are not shown.
+    """
+    explained = measured_stiffness.COVERAGE_FACTOR
+    panel.axvspan(-explained, explained, color=EXPLAINED_COLOUR, zorder=0)
     panel.axvline(0.0, color="black", linewidth=0.6)
     colours = [figures.COLOURS[0] if row.explained else figures.COLOURS[1] for row in rows]
-    panel.barh(np.arange(len(rows)), differences, 0.6, color=colours)
+    panel.barh(np.arange(len(rows)), differences, BAR_SHARE, color=colours)
     panel.set(xlabel="computed less measured (standard uncertainties)")
-    reach = 1.1 * max(greatest, 1.5 * measured_stiffness.COVERAGE_FACTOR)
+    reach = ROOM_BEYOND_BARS * max(greatest, LEAST_REACH * explained)
     panel.set_xlim(-reach, reach)
     panel.set_yticks(np.arange(len(rows)), [f"{row.entry.name} (line {row.entry.line})" for row in rows])
     panel.set_ylim(len(rows) - 0.4, -0.6)
@@ -274,7 +287,7 @@ def _draw_variances(panel: "Axes", rows: Sequence["MeasuredRow"]) -> None:
     parts = np.array([[row.u_num, row.u_input, row.u_data] for row in rows]) ** 2
     shares = 100.0 * parts / parts.sum(axis=1, keepdims=True)
     for share, colour, words in zip(shares.T, figures.COLOURS[2:], SOURCE_WORDS.values(), strict=False):
-        panel.barh(np.arange(len(rows)), share, 0.6, start, color=colour, label=words)
+        panel.barh(np.arange(len(rows)), share, BAR_SHARE, start, color=colour, label=words)
         start = start + share
     panel.set(xlabel="share of the variance (%)", xlim=(0, 100))
 

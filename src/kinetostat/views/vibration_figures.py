@@ -33,6 +33,16 @@ ROOM_BESIDE, ROOM_ABOVE, HEADING_HEIGHT = 2.0 * ROOM, 3.5 * ROOM, 1.5 * ROOM
 mode moves the machine to all sides, and a line of text stands above it."""
 MACHINE_WIDTH = 2.4
 """Width of a machine with the room beside it, inches: a heading is as wide."""
+RESPONSE_SIZE = (7.6, 5.6)
+"""Width and height of the figure of a response, inches: a page wide, and four panels high enough for their scales."""
+MODE_COLOUR = "#bbbbbb"
+"""Pale grey of the lines at natural frequencies, which cross the curves."""
+ROOM_FOR_TITLE, MARGINS = 0.9, 0.4
+"""Height of title and legend of the shapes, and width of both margins of their figure, inches."""
+AXES_CORNER = (0.5, 0.4)
+"""Place of the origin of the axes, left of and below the machine, in units of the room beside it."""
+LETTER_DISTANCE = 1.3
+"""Place of the letter of an axis, in lengths of the axis: beyond its end."""
 ANY_SIZE = "a mode has a shape, and no size: the motion is as large as can be seen"
 """Sentence below the shapes."""
 
@@ -58,7 +68,7 @@ def response_figure(answer: Vibration, title: str = "{}: motion of the tool per 
     motors = "" if answer.loops is None else " with motors that stand still"
     legend = f"grey lines: natural frequencies{motors}, numbered from the lowest; circles: least real part, "
     legend += "which limits a cut"
-    with new_figure((7.6, 5.6), title.format(machine.name), setting_of(machine, []), legend) as figure:
+    with new_figure(RESPONSE_SIZE, title.format(machine.name), setting_of(machine, []), legend) as figure:
         panels = _response_panels(figure)
         for place, (name, axis) in enumerate(drawn_directions(answer.direction, answer.components).items()):
             look = {"color": COLOURS[place], "linestyle": DASHES[place % len(DASHES)], "label": f"along {name}"}
@@ -107,7 +117,7 @@ def _mark_modes(panel: Axes, answer: Vibration, frequencies: Array) -> None:
     """Draw a line at each natural frequency, and give the axis of frequencies numbers that can be read."""
     for mode in answer.modes:
         if frequencies[0] <= mode.frequency <= frequencies[-1]:
-            panel.axvline(mode.frequency, color="#bbbbbb", linewidth=0.6, zorder=0)
+            panel.axvline(mode.frequency, color=MODE_COLOUR, linewidth=0.6, zorder=0)
     panel.margins(x=0.0)
     panel.xaxis.set_major_formatter("{x:g}")
     panel.xaxis.set_minor_formatter("")
@@ -145,9 +155,9 @@ def shapes_figure(answer: Vibration, title: str = "{}: shapes of modes") -> Figu
     view = _view_of(machine, response.configuration)
     shown = [(k, mode, mode.shape) for k, mode in enumerate(answer.modes[:DRAWN_MODES], 1) if mode.shape is not None]
     rows, columns = grid_shape(len(shown))
-    across = 0.4 + MACHINE_WIDTH * columns
-    size = (across, 0.9 + across * rows * view.height / (columns * view.width))  # with title and legend, inches
-    axis = float(f"{view.diagonal / AXES_IN_DIAGONAL:.0e}")
+    width = MARGINS + MACHINE_WIDTH * columns
+    size = (width, ROOM_FOR_TITLE + width * rows * view.height / (columns * view.width))
+    axis_length = float(f"{view.diagonal / AXES_IN_DIAGONAL:.0e}")
     with new_figure(size, title.format(machine.name)) as figure:
         panel = figure.add_subplot(aspect="equal")
         for number, mode, shape in shown:
@@ -156,11 +166,11 @@ def shapes_figure(answer: Vibration, title: str = "{}: shapes of modes") -> Figu
             motion_overlay(machine, response, shape).draw(panel, partial(view.project, place=place))
             heading = f"{number}: {machine.display.show(mode.frequency, 'Hz')} (tool: {mode.direction})"
             panel.annotate(heading, view.heading(place), ha="center", va="bottom", size=STYLE["axes.titlesize"])
-        _draw_axes(panel, view, axis, "xy" if planar else "xyz")
+        _draw_axes(panel, view, axis_length, "xy" if planar else "xyz")
         left, top = view.low[0] - ROOM * view.diagonal, view.high[1] + (ROOM_ABOVE - ROOM) * view.diagonal
         panel.set(xlim=(left, left + columns * view.width), ylim=(top - rows * view.height, top))
         panel.set_axis_off()
-        setting = f"{setting_of(machine, [])}; axes as long as {machine.display.show(axis, 'm')}\n{ANY_SIZE}"
+        setting = f"{setting_of(machine, [])}; axes as long as {machine.display.show(axis_length, 'm')}\n{ANY_SIZE}"
         add_overlay_legend(figure, ("at rest", "in the mode"), setting)
     return figure
 
@@ -219,9 +229,9 @@ def picture_coordinates(points: Points, directions: Array) -> Array:
 
 def _draw_axes(panel: Axes, view: ShapeView, length: float, names: str) -> None:
     """Draw axes of the base of a length (m) in the lower left corner of a picture, with their names."""
-    corner = tuple(view.low - np.array([0.5, 0.4]) * ROOM * view.diagonal)
+    corner = tuple(view.low - np.array(AXES_CORNER) * ROOM * view.diagonal)
     for name in names:
         axis = Vector(*AXES[name]) * length
         panel.plot(*view.project([ZERO, axis], corner), color=GUIDE_COLOUR, linewidth=0.8)
-        (end,) = zip(*view.project([axis * 1.3], corner), strict=True)
+        (end,) = zip(*view.project([axis * LETTER_DISTANCE], corner), strict=True)
         panel.annotate(name, end, ha="center", va="center", size=7)

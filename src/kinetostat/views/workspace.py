@@ -87,15 +87,15 @@ MOST_NODES = 64
 """Nodes along an axis that the picture of a solid shows at most: its triangles are then as small as dots."""
 LIGHT = np.array([-0.45, -0.7, 0.55])
 """Direction towards the light: over the left shoulder of the reader, so that edges are seen."""
-WIDTH_ALONE, WIDTH_AMONG_OTHERS = 4.6, 2.6
-"""Width of the panel of a cut with its numbers, alone and among others, inches."""
+WIDTH_ALONE, WIDTH_AMONG_OTHERS, CUT_HEIGHT, SQUARE_HEIGHT = 4.6, 2.6, 0.9, 0.85
+"""Width of the panel of a cut with its numbers, alone and among others, inches; its height, and that of a square in it
+without numbers, in widths of the panel."""
+ROOM_BESIDE_CUTS, SOLID_SIZE = (0.3, 0.9), (5.2, 4.8)
+"""Width of the margins of cuts and height of their title and legend; size of the figure of a solid; inches."""
+PATCH_EDGE = {"edgecolor": "#888888", "linewidth": 0.4}
+"""Thin grey edge of the colours in a legend: a pale one is seen on white."""
 SHADE = 0.24
 """Share of the brightness that depends on how a surface faces the light: colours still tell the quantity."""
-
-
-def _lines(answer: Workspace) -> Lines:
-    yield from _volume_lines(answer)
-    yield from _border_lines(answer)
 
 
 def _volume_lines(answer: Workspace) -> Lines:
@@ -184,7 +184,7 @@ def workspace_figures(answer: Workspace) -> dict[str, Drawing]:
     dataset, title = answer.dataset, answer.machine.name
     dims = [str(dim) for dim in dataset["verdict"].dims]
     if len(dims) == 2:
-        region = partial(_sections, [dataset], answer, title=title)
+        region = partial(_draw_cuts, [dataset], answer, title=title)
         return {"region": Drawing("The workspace.", region, file="workspace")}
     fixed = {dim: float(dataset.attrs.get(field_of(dataset[dim]), dataset[dim].values.mean())) for dim in dims[3:]}
     if fixed:
@@ -192,8 +192,8 @@ def workspace_figures(answer: Workspace) -> dict[str, Drawing]:
         title = f"{title}, {', '.join(_coordinate_text(dataset, dim) for dim in fixed)}"
     cuts = [dataset.isel({dims[2]: int(i)}) for i in _chosen_cuts(dataset, dims)]
     quantity = next((condition.quantity for condition in answer.conditions), COLOURING_QUANTITY)
-    sections = partial(_sections, cuts, answer, along=dims[2], title=title)
-    solid = partial(_solid, dataset, dims[:3], quantity, title=title)
+    sections = partial(_draw_cuts, cuts, answer, along=dims[2], title=title)
+    solid = partial(_draw_solid, dataset, dims[:3], quantity, title=title)
     return {
         "sections": Drawing("The workspace.", sections, file="workspace-sections"),
         "solid": Drawing("The workspace.", solid, file="workspace-solid"),
@@ -206,7 +206,8 @@ def _chosen_cuts(dataset: xr.Dataset, dims: Sequence[str]) -> Array:
     last = dataset.sizes[dims[2]] - 1
     first, final = (max(0, reached[0] - 1), min(last, reached[-1] + 1)) if reached.size else (0, last)
     span = final - first
-    finest = max(1, -(-span // (MOST_CUTS - 1)))
+    finest = max(1, math.ceil(span / (MOST_CUTS - 1)))
+    # A step that divides the span shows both ends; without one near the finest, the cuts lie in its middle.
     step = next((candidate for candidate in range(finest, 2 * finest) if span % candidate == 0), finest)
     return np.arange(first + span % step // 2, final + 1, step)
 
@@ -225,7 +226,7 @@ def _colours(labels: Sequence[str]) -> list[str]:
     ]
 
 
-def _sections(cuts: Sequence[xr.Dataset], answer: Workspace, title: str, along: str = "") -> "Figure":
+def _draw_cuts(cuts: Sequence[xr.Dataset], answer: Workspace, title: str, along: str = "") -> "Figure":
     """Draw a panel for each cut, filled by verdict, with the contours of the conditions.
 
     Args:
@@ -234,60 +235,57 @@ def _sections(cuts: Sequence[xr.Dataset], answer: Workspace, title: str, along: 
         title: over the figure.
         along: the coordinate whose value is the title of each panel; none if empty.
     """
-    labels, conditions = answer.verdicts, answer.conditions
     rows, columns = figures.grid_shape(len(cuts))
     width = WIDTH_ALONE if len(cuts) == 1 else WIDTH_AMONG_OTHERS
-    with figures.new_figure((width * columns + 0.3, 0.9 * width * rows + 0.9), title) as figure:
+    (room_beside, room_above), conditions = ROOM_BESIDE_CUTS, answer.conditions
+    size = width * columns + room_beside, CUT_HEIGHT * width * rows + room_above
+    with figures.new_figure(size, title) as figure:
         panels = figures.panel_grid(figure, len(cuts), sharex=True, sharey=True)
         borders: set[PoseCondition] = set()
         for panel, cut in zip(panels, cuts, strict=True):
-            borders |= _fill(panel, cut, labels, conditions)
+            borders |= _draw_cut(panel, cut, answer)
             if along and len(cuts) > 1:
                 panel.set_title(_coordinate_text(cut, along))
-        map_scales.trim_height(figure, panels[0], 0.85 * width * rows)
+        map_scales.trim_height(figure, panels[0], SQUARE_HEIGHT * width * rows)
         frame = cuts[0].attrs.get("frame", "") if conditions else ""
         figure.legend(
-            handles=[*_patches(cuts, labels), *_border_legend(conditions, borders)],
+            handles=[*_patches(cuts, answer.verdicts), *_border_legend(conditions, borders)],
             loc="outside lower center", ncols=min(3, 1 + columns), title=frame, title_fontsize=figures.NOTE_SIZE,
         )  # fmt: skip
     return figure
 
 
-def _fill(
-    panel: "Axes", cut: xr.Dataset, labels: Sequence[str], conditions: Sequence[PoseCondition]
-) -> set[PoseCondition]:
+def _draw_cut(panel: "Axes", cut: xr.Dataset, answer: Workspace) -> set[PoseCondition]:
     """Fill a panel by verdict and draw the border of each condition; return the conditions that have one."""
-    across, up = (str(dim) for dim in cut["verdict"].dims)
+    labels, (across, up) = answer.verdicts, map(str, cut["verdict"].dims)
     (x, x_label), (y, y_label) = grid.axis_values(cut, across), grid.axis_values(cut, up)
-    verdict = cut["verdict"].transpose(up, across).values
-    figures.fill_regions(panel, x, y, verdict, np.ones_like(verdict, dtype=bool), _colours(labels))
+    verdict, colours = cut["verdict"].transpose(up, across).values, _colours(labels)
+    figures.fill_regions(panel, x, y, verdict, np.ones_like(verdict, dtype=bool), colours)
     shares = [cut[f"{BORDER_VARIABLES}{dim}"].transpose(up, across).values for dim in (up, across)]
-    for code in sorted(np.unique(verdict), reverse=True):
+    for code in sorted(np.unique(verdict), reverse=True):  # the inside, 0, comes last and lies over the others
         within = depth(verdict == code, shares)
         if within.min() < 0.0 < within.max():
-            panel.contourf(x, y, within, levels=[0.0, 2.0], colors=[_colours(labels)[code]])
+            panel.contourf(x, y, within, levels=[0.0, 2.0], colors=[colours[code]])  # depths are at most 1
             if code == 0:
                 panel.contour(x, y, within, levels=[0.0], colors=OUTLINE_COLOUR, linewidths=0.9)
-    elsewhere = ~np.isin(
-        verdict, [i for i, label in enumerate(labels) if label == INSIDE or label.startswith(CONDITION_VERDICT)]
-    )
-    edges = set()
-    for condition, colour in zip(conditions, figures.COLOURS, strict=False):
-        values = np.ma.masked_where(elsewhere, cut[condition.quantity].transpose(up, across).values)
+    judged = [i for i, label in enumerate(labels) if label == INSIDE or label.startswith(CONDITION_VERDICT)]
+    drawn = set()
+    for condition, colour in zip(answer.conditions, figures.COLOURS, strict=False):
+        values = np.ma.masked_where(~np.isin(verdict, judged), cut[condition.quantity].transpose(up, across).values)
         if values.count() and values.min() < condition.value < values.max():
             panel.contour(x, y, values, levels=[condition.value], colors=colour, linewidths=1.2, linestyles="--")
-            edges.add(condition)
+            drawn.add(condition)
     panel.set(xlabel=x_label, ylabel=y_label, xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     map_scales.set_axis_scales(panel, cut, across, up)
     panel.label_outer()
-    return edges
+    return drawn
 
 
 def _patches(cuts: Sequence[xr.Dataset], labels: Sequence[str]) -> list["patches.Patch"]:
     """Return the legend of the colours that occur."""
     present = {int(code) for cut in cuts for code in np.unique(cut["verdict"].values)}
     return [
-        patches.Patch(facecolor=colour, edgecolor="#888888", linewidth=0.4, label=phrase(label))
+        patches.Patch(facecolor=colour, label=phrase(label), **PATCH_EDGE)
         for code, (label, colour) in enumerate(zip(labels, _colours(labels), strict=True))
         if code in present
     ]
@@ -303,13 +301,13 @@ def _border_legend(conditions: Sequence[PoseCondition], drawn: set[PoseCondition
     ]
 
 
-def _solid(dataset: xr.Dataset, dims: Sequence[str], quantity: str, title: str) -> "Figure":
+def _draw_solid(dataset: xr.Dataset, dims: Sequence[str], quantity: str, title: str) -> "Figure":
     """Draw the inside as a lit solid in a box with scales, coloured by a quantity on its surface."""
     triangles, values = _coloured_surface(dataset, dims, quantity)
     axes = [grid.axis_values(dataset, dim) for dim in dims]
     scale = grid.display_of(dataset).scale(dataset[quantity].attrs["units"])
     values = scale.factor * values
-    with figures.new_figure((5.2, 4.8), title) as figure:
+    with figures.new_figure(SOLID_SIZE, title) as figure:
         panel = figure.add_subplot(projection="3d")
         norm = _norm_of(values)
         low, high = norm.vmin or 0.0, norm.vmax or 1.0
@@ -336,7 +334,7 @@ def _coloured_surface(dataset: xr.Dataset, dims: Sequence[str], quantity: str) -
 
     A large grid is thinned to `MOST_NODES`.
     """
-    thin = dataset.isel({dim: slice(None, None, -(-dataset.sizes[dim] // MOST_NODES)) for dim in dims})
+    thin = dataset.isel({dim: slice(None, None, math.ceil(dataset.sizes[dim] / MOST_NODES)) for dim in dims})
     axes = [grid.axis_values(thin, dim)[0] for dim in dims]
     inside = thin["verdict"].transpose(*dims).values == 0
     if thin.sizes == dataset.sizes:
@@ -418,7 +416,7 @@ WORKSPACE = Description(
         Field("singularities_divide"),
         Field("demands"),
     ),
-    lines=_lines,
+    lines=lambda answer: [*_volume_lines(answer), *_border_lines(answer)],
     tables=_tables,
     figures=workspace_figures,
     makers={"nc": attrgetter("dataset")},
