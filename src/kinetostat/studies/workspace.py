@@ -169,6 +169,11 @@ class Workspace(ImmutableAnswer):
         return f"<Workspace of {self.machine.name!r}: {self.nodes[INSIDE]:,} of {total:,} nodes inside>"
 
     @property
+    def inside(self) -> Mask:
+        """Flags of the nodes that are inside, over the axes of the grid."""
+        return np.asarray(self.dataset["verdict"].values == self.verdicts.index(INSIDE))
+
+    @property
     def exists(self) -> bool:
         """Whether any pose is inside."""
         return self.volume.value > 0.0 or self.nodes[INSIDE] > 0

@@ -16,7 +16,7 @@ from kinetostat.engine.points import Population
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.status import Status
 from kinetostat.spec.immutable import Immutable
-from kinetostat.studies.optimisation.problem import Problem
+from kinetostat.studies.optimisation.problem import Constraint, Objective, Problem
 from kinetostat.studies.optimisation.space import Variable
 from kinetostat.tolerances import ROUND_OFF_OF_SHARE
 
@@ -146,11 +146,12 @@ class Assessor:
         problem = self.problem
         answers = evaluate_designs(problem.machine, Population(columns, problem.poses.columns), problem.names)
         reached = answers.status == Status.OK
-        terms, count = [*problem.objectives, *problem.constraints], len(problem.objectives)
+        terms: list[Objective | Constraint] = [*problem.objectives, *problem.constraints]
         rows = [self._over_machines(t.term.values(answers.values, reached), machines, t.sign > 0) for t in terms]
         status_by_design = answers.status.reshape(-1, machines * answers.status.shape[1])
         by_design = np.array(rows).T.reshape(len(status_by_design), len(terms))
-        return _outcome(problem, by_design[:, :count], by_design[:, count:], status_by_design)
+        objectives, constraints = np.split(by_design, [len(problem.objectives)], axis=1)
+        return _outcome(problem, objectives, constraints, status_by_design)
 
     def _over_machines(self, values: Array, machines: int, high_is_bad: bool) -> Array:
         """One number for each design, as the study sums up the numbers of its machines."""

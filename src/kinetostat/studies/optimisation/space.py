@@ -355,8 +355,7 @@ def _grid(machine: Machine, table: PosesTable) -> PoseSet:
     size = "x".join(str(count) for count in question.grid.shape)
     if table.within is None:
         return PoseSet(columns, table.required, _box(question), f"a grid of {size} poses")
-    answer = workspace.workspace(machine, table.over or [], table.where)
-    inside = answer.dataset["verdict"].values.ravel() == answer.verdicts.index(workspace.INSIDE)
+    inside = workspace.workspace(machine, table.over or [], table.where).inside.ravel()
     if not inside.any():
         raise InputError("[poses]: no node of the grid lies in the workspace of the machine; widen over or where.")
     kept = {path: column[inside] for path, column in columns.items()}
