@@ -162,10 +162,10 @@ def best_fit(equations: ResidualEquations, groups: Integers, options: FitOptions
         options: priors, bounds, and what to do with outliers.
         tell: receives how far the work is.
     """
-    values = np.zeros(len(options.sizes))
-    before, rates = _rates_at(equations, values, options)
+    units = np.zeros(len(options.sizes))
+    before, rates = _rates_at(equations, units, options)
     kept, spread = np.ones(len(before), dtype=bool), _median_spread(before, rates, options)
-    state = _Iterate(values=values, after=before, rates=rates, kept=kept, spread=spread)
+    state = _Iterate(units=units, after=before, rates=rates, kept=kept, spread=spread)
     for with_loss in (True, False) if options.robust else (False,):
         state = _settle(equations, options, state, with_loss, tell)
     return _fit_result(before, state, groups, options)
@@ -176,14 +176,14 @@ class _Iterate:
     """A fit between two rounds.
 
     Attributes:
-        values: values of the unknowns, SI [unknowns].
+        units: values of the unknowns, in plausible sizes [unknowns].
         after: residuals with them, in standard deviations [rows].
         rates: how these fall per plausible size of each unknown [rows x unknowns].
         kept: flags of the rows that are not outliers [rows].
         spread: standard deviation of the residuals, in those that they are counted in.
     """
 
-    values: Array
+    units: Array
     after: Array
     rates: Array
     kept: Mask
@@ -207,20 +207,20 @@ def _settle(
         if settled and seen.rank == rank:
             break
         tell(number, MOST_ROUNDS, f"{int((~state.kept).sum())} outliers")
-        values = _least_squares(equations, options, state, seen, with_loss)
-        after, rates = _rates_at(equations, values, options)
+        units = _least_squares(equations, options, state, seen, with_loss)
+        after, rates = _rates_at(equations, units, options)
         if options.estimates_spread:
-            spread = _likeliest_spread(after[state.kept], rates[state.kept], values, options)
+            spread = _likeliest_spread(after[state.kept], rates[state.kept], units, options)
         else:
             spread = _median_spread(after, rates, options)
         settled, rank = abs(spread - state.spread) <= SAME_SPREAD * state.spread, seen.rank
-        state = replace(state, values=values, after=after, rates=rates, spread=spread)
+        state = replace(state, units=units, after=after, rates=rates, spread=spread)
     return state
 
 
-def _rates_at(equations: ResidualEquations, values: Array, options: FitOptions) -> tuple[Array, Array]:
-    """The residuals [rows], and how they fall per plausible size of each unknown [rows x unknowns]."""
-    after, rates = equations.linearisation(values)
+def _rates_at(equations: ResidualEquations, units: Array, options: FitOptions) -> tuple[Array, Array]:
+    """The residuals [rows] at values in plausible sizes, and how they fall per size of each [rows x unknowns]."""
+    after, rates = equations.linearisation(units * options.sizes)
     return after, rates * options.sizes
 
 
@@ -241,7 +241,7 @@ def _median_spread(residuals: Array, rates: Array, options: FitOptions) -> float
     return max(DEVIATION_OVER_MEDIAN * float(np.median(np.abs(residuals[affected]))), least)
 
 
-def _likeliest_spread(residuals: Array, rates: Array, values: Array, options: FitOptions) -> float:
+def _likeliest_spread(residuals: Array, rates: Array, units: Array, options: FitOptions) -> float:
     """Estimate the standard deviation of measurements where priors weigh against them.
 
     Residuals alone do not say it: the larger it is, the more of them the priors leave. So standard deviations are
@@ -252,14 +252,14 @@ def _likeliest_spread(residuals: Array, rates: Array, values: Array, options: Fi
     Args:
         residuals: residuals of the kept rows at the values [rows].
         rates: how they fall per plausible size of each unknown [rows x unknowns].
-        values: values of the unknowns, SI [unknowns].
+        units: values of the unknowns in plausible sizes [unknowns].
         options: priors and preferences.
 
     Source: D. MacKay, Neural Computation 4(3), 1992, equations 2.9 and 2.14.
     """
     weights = np.maximum(np.hypot(options.sizes / options.priors, options.preferred), LEAST_WEIGHT)
     directions, prior_spreads, _ = np.linalg.svd(rates / weights, full_matrices=False)
-    drawn_residuals = residuals + rates @ (values / options.sizes)  # with all unknowns zero
+    drawn_residuals = residuals + rates @ units  # with all unknowns zero
     squares = (directions.T @ drawn_residuals) ** 2
     total, count = float(drawn_residuals @ drawn_residuals), len(drawn_residuals)
     other_squares, other_count = max(total - float(squares.sum()), 0.0), count - len(squares)
@@ -337,7 +337,7 @@ def _combinations(rates: Array, options: FitOptions, spread: float) -> _SeenComb
 def _least_squares(
     equations: ResidualEquations, options: FitOptions, state: _Iterate, seen: _SeenCombinations, with_loss: bool
 ) -> Array:
-    """Values of the unknowns by least squares of the kept rows, or by Cauchy's loss at the scale of the spread, SI."""
+    """Values in plausible sizes by least squares of the kept rows, or by Cauchy's loss at the scale of the spread."""
     from scipy.optimize import least_squares  # half a second to import
 
     kept, bounds = state.kept, options.bounds / options.sizes
@@ -349,7 +349,7 @@ def _least_squares(
         return np.concatenate([measured, seen.rows_beside_measured @ units, constant])
 
     def slopes(units: Array) -> Array:
-        measured = -_rates_at(equations, units * options.sizes, options)[1][kept]
+        measured = -_rates_at(equations, units, options)[1][kept]
         return np.concatenate([measured, seen.rows_beside_measured, no_slope])
 
     def loss(squares: Array) -> Array:
@@ -360,10 +360,10 @@ def _least_squares(
 
     form, scale, precision = (loss, state.spread, FIT_BEGUN) if with_loss else ("linear", 1.0, FIT_SETTLED)
     answer = least_squares(
-        residuals, state.values / options.sizes, slopes, (-bounds, bounds), loss=form, f_scale=scale,
+        residuals, state.units, slopes, (-bounds, bounds), loss=form, f_scale=scale,
         ftol=precision, xtol=precision, gtol=None, max_nfev=MOST_FIT_STEPS,
     )  # fmt: skip
-    return np.asarray(answer.x * options.sizes)
+    return np.asarray(answer.x)
 
 
 def _fit_result(before: Array, state: _Iterate, groups: Integers, options: FitOptions) -> Fit:
@@ -374,7 +374,7 @@ def _fit_result(before: Array, state: _Iterate, groups: Integers, options: FitOp
     scatter = float(np.sqrt((kept_residuals**2).sum() / freedom))
     covariance, interval = _covariance_and_interval(kept_rates, seen, options, scatter, freedom)
     return Fit(
-        values=state.values,
+        values=state.units * options.sizes,
         covariance=covariance,
         half_intervals=_half_intervals(interval, seen, options),
         kept=state.kept,

@@ -7,6 +7,7 @@ Source: theory (64); exact places and rates are those of theory (46) and (48).
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import field
 
 import numpy as np
 
@@ -68,6 +69,7 @@ class Observation:
     row_poses: Integers
     sigma: Array
     measured: Array
+    _last_linearisation: dict[bytes, tuple[Array, Array]] = field(init=False, default_factory=dict)
 
     @property
     def turns(self) -> Mask:
@@ -88,8 +90,17 @@ class Observation:
         """The residuals, and how each falls per unit of each unknown [rows x unknowns], theory (64).
 
         Errors of geometry displace the tool of the drawn machine, and springs with their errors of compliance deflect
-        it; the target on it is then seen from the measuring frame.
+        it; the target on it is then seen from the measuring frame. The last answer is kept: a round of a fit begins at
+        the values where the one before it has ended.
         """
+        key = values.tobytes()
+        if key not in self._last_linearisation:
+            linearisation = self._new_linearisation(values)
+            self._last_linearisation.clear()
+            self._last_linearisation[key] = linearisation
+        return self._last_linearisation[key]
+
+    def _new_linearisation(self, values: Array) -> tuple[Array, Array]:
         model, errors, per_spring = self.model, self.errors(values), self._deflections_per_spring
         deflection = per_spring @ (1.0 + errors[self._first_spring :])
         wanted = set(np.flatnonzero(self.error_mix.any(axis=1)).tolist())
