@@ -65,7 +65,7 @@ def test_gaps_change_at_their_rates(given):
     assert set(free) == set(COORDINATES) - set(given)
     for problems in problems_of(chains, 1, free):
         goal, here = problems.at_home(), np.zeros((1, problems.size))
-        gaps, slopes = problems.gaps(here, goal)
+        gaps, slopes, _ = problems.gaps(here, goal)
         assert gaps == pytest.approx(0.0, abs=1e-15)
         for k, step in enumerate(np.eye(problems.size) * HALF):
             change = problems.gaps(here + step, goal)[0] - problems.gaps(here - step, goal)[0]

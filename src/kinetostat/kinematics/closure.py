@@ -230,7 +230,7 @@ def _with_undetermined(problems: Problems, unknowns: Array, goal: Coordinates, c
     if not solved.size:
         return codes
     problems = problems.subset(solved)
-    rates = problems.gaps(unknowns[solved], coordinates_at(goal, solved))[1]
+    rates = problems.gaps(unknowns[solved], coordinates_at(goal, solved)).rates
     square = np.swapaxes(rates, 1, 2) @ rates
     damping = LEAST_NORM_DAMPING * np.trace(square, axis1=1, axis2=2)
     moving = np.eye(problems.size)[:, problems.size - len(problems.free) :]

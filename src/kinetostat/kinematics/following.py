@@ -178,7 +178,7 @@ def _step(problems: Problems, unknowns: Array, target: Coordinates, longest: flo
     Returns:
         The unknowns after the step, the factor by which it could be longer, and whether it is accepted.
     """
-    gaps, rates = problems.gaps(unknowns, target)
+    gaps, rates, _ = problems.gaps(unknowns, target)
     tangent = least_norm(rates, gaps)
     tangent_size = largest(tangent)
     end, factor = unknowns.copy(), longest / np.maximum(tangent_size, LEAST_DIVISOR)
@@ -186,7 +186,8 @@ def _step(problems: Problems, unknowns: Array, target: Coordinates, longest: flo
     tried = np.flatnonzero(accepted)
     if tried.size:
         part, start = problems.subset(tried), unknowns[tried] + tangent[tried]
-        correction = least_norm(*part.gaps(start, coordinates_at(target, tried))[::-1])
+        gaps, rates, _ = part.gaps(start, coordinates_at(target, tried))
+        correction = least_norm(rates, gaps)
         error = largest(correction)
         contracts = (error <= STEP_CONTRACTION * tangent_size[tried]) | (error <= NO_CONTRACTION)
         accepted[tried] = contracts & (error <= MOST_TANGENT_ERROR)
@@ -210,7 +211,7 @@ def _least_gap(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[
     # The slope vanishes where the gap is greatest too, as at the end of a crank's stroke: the descent starts beside.
     best, is_least = unknowns + START_SHIFT * np.cos(np.arange(problems.size)), np.zeros(len(unknowns), dtype=bool)
     items, share = np.arange(len(unknowns)), np.ones(len(unknowns))
-    gaps, rates, distance = problems.gaps_and_distance(best, goal)
+    gaps, rates, distance = problems.gaps(best, goal)
     slope = np.einsum("nrc,nr->nc", rates, gaps)
     inverse = np.linalg.inv(np.einsum("nrc,nrd->ncd", rates, rates) + STIFFENING * np.eye(problems.size))
     for _ in range(MOST_DESCENTS):
@@ -225,7 +226,7 @@ def _least_gap(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[
         step = np.einsum("ncd,nd->nc", inverse, slope)
         step *= (share * np.minimum(1.0, LONGEST_DESCENT / np.maximum(largest(step), LEAST_DIVISOR)))[:, None]
         end = best[items] + step
-        gaps, rates, end_distance = problems.subset(items).gaps_and_distance(end, coordinates_at(goal, items))
+        gaps, rates, end_distance = problems.subset(items).gaps(end, coordinates_at(goal, items))
         end_slope = np.einsum("nrc,nr->nc", rates, gaps)
         better = end_distance < distance
         inverse[better] = _updated_inverse(inverse[better], step[better], slope[better] - end_slope[better])
@@ -279,7 +280,7 @@ def signs(problems: Problems, unknowns: Array, goal: Coordinates) -> Array:
         unknowns: its coordinates [problems x coordinates].
         goal: coordinates of the platform, which only say how many problems there are.
     """
-    rates = problems.gaps(unknowns, goal)[1]
+    rates = problems.gaps(unknowns, goal).rates
     rows = [2, 3, 4] if stays_in_plane(problems.chains) else [0, 1, 2, 3, 4, 5]
     if len(rows) != rates.shape[2]:
         return np.zeros(len(rates))

@@ -9,7 +9,7 @@ Source: theory (19)-(21); placements are in the base frame.
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields, replace
 from itertools import islice
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,8 @@ from kinetostat.algebra.scalar import Scalar, is_zero
 from kinetostat.algebra.vector import Displacement, Vector
 from kinetostat.arrays import Array, Integers, Mask
 from kinetostat.frozen import dataclass
-from kinetostat.kinematics.closing import ANGLES, POINT, leg_end, placement_of, rotation_between, squared_distance
+from kinetostat.kinematics import closing
+from kinetostat.kinematics.closing import ANGLES, POINT, leg_end, placement_of, rotation_between
 from kinetostat.machine.column import column, plain, stacked_columns
 from kinetostat.machine.machine import Chains, Step
 from kinetostat.numerics.iteration import Steps, largest, least_norm
@@ -63,8 +64,9 @@ class Build:
 def builds_of(chains: Chains) -> list[Build]:
     """Sort the legs of a machine by their build."""
     alike: dict[tuple[Any, ...], list[tuple[list[Any], Integers]]] = {}
-    first = 0
+    first = 0  # place of the leg's first coordinate among those of the machine
     for steps in chains.legs:
+        # A spring that moves is placed as its joint.
         elements = [getattr(step.element, "joint", step.element) for step in steps if step.moves]
         keys = tuple(_build_key(element) for element in elements)
         alike.setdefault(keys, []).append((elements, np.arange(first, first + len(elements))))
@@ -137,6 +139,24 @@ class AlikeLegs:
     columns: Integers
 
 
+class GapsToGoal(NamedTuple):
+    """Gaps that are left from the ends of legs to the goal.
+
+    The gap of a rotation is the sine of its angle a, which vanishes at half a turn as well. The distance has
+    2 (1 - cos a) in the place of its square: this vanishes at 0 only, and the slope of half the squared distance is
+    exactly the gaps times their rates, however large they are.
+
+    Attributes:
+        gaps: six numbers for each leg, a rotation vector and a displacement in units of the length [problems x rows].
+        rates: how the unknowns reduce them [problems x rows x unknowns].
+        squared_distance: the squared distance of all ends of a problem from the goal [problems].
+    """
+
+    gaps: Array
+    rates: Array
+    squared_distance: Array
+
+
 @dataclass(frozen=True)
 class Problems:
     """Equations to be solved, all of one form: at a pose, one leg alone, or all legs and the coordinates not given.
@@ -200,33 +220,17 @@ class Problems:
         parts = tuple(replace(part, legs=part.legs[problems]) for part in self.parts)
         return replace(self, poses=self.poses[problems], parts=parts)
 
-    def gaps(self, unknowns: Array, goal: Coordinates) -> tuple[Array, Array]:
-        """Return what is left from the legs' ends to the goal, and how the unknowns reduce it.
+    def gaps(self, unknowns: Array, goal: Coordinates) -> GapsToGoal:
+        """Find the gaps from the legs' ends to the goal.
 
         Args:
             unknowns: [problems x unknowns].
             goal: coordinates of the platform; those not given are those of the home pose.
-
-        Returns:
-            Six numbers for each leg, a rotation vector and a displacement in units of the length
-            [problems x rows], and their rates [problems x rows x unknowns].
-        """
-        return self.gaps_and_distance(unknowns, goal)[:2]
-
-    def gaps_and_distance(self, unknowns: Array, goal: Coordinates) -> tuple[Array, Array, Array]:
-        """Return the gaps and their rates, and the squared distance of all ends from the goal [problems].
-
-        The gap of a rotation is the sine of its angle a, which vanishes at half a turn as well. The distance has
-        2 (1 - cos a) in the place of its square: this vanishes at 0 only, and the slope of half the distance is exactly
-        the gaps times their rates, however large they are.
-
-        Args:
-            unknowns, goal: as for `gaps`.
         """
         lengths, first = self.lengths, self.size - len(self.free)
         for k, name in enumerate(self.free, first):
             goal = goal | {name: goal[name] + unknowns[:, k] * (1.0 if name in ANGLES else lengths)}
-        gaps, rates, distance = [], [], np.zeros(len(unknowns))
+        gaps, rates, squared_distance = [], [], np.zeros(len(unknowns))
         for part in self.parts:
             legs = part.legs.shape[1]
             ends, twists = self._ends(part, unknowns, lengths)
@@ -236,9 +240,10 @@ class Problems:
             shift = [plain(c) * (1.0 / leg_lengths) for c in (wanted.translation - ends.translation).components()]
             gaps.append(stacked_columns([*turn, *shift], len(leg_lengths)).reshape(len(lengths), 6 * legs))
             rates.append(self._rates_by_all_unknowns(part, twists, wanted, len(lengths)))
-            squares = plain(squared_distance(ends, wanted, column(leg_lengths)))
-            distance = distance + np.asarray(squares).reshape(-1, legs).sum(axis=1)
-        return np.hstack(gaps), rates[0] if len(rates) == 1 else np.concatenate(rates, axis=1), distance
+            squares = plain(closing.squared_distance(ends, wanted, column(leg_lengths)))
+            squared_distance = squared_distance + np.asarray(squares).reshape(-1, legs).sum(axis=1)
+        all_rates = rates[0] if len(rates) == 1 else np.concatenate(rates, axis=1)
+        return GapsToGoal(np.hstack(gaps), all_rates, squared_distance)
 
     def closing_equations(
         self, goal: Coordinates, solve: Callable[[Array, Array], Array] = least_norm
@@ -252,7 +257,7 @@ class Problems:
         """
 
         def equations(unknowns: Array, rows: Integers) -> tuple[Array, Steps]:
-            gaps, rates = self.subset(rows).gaps(unknowns, coordinates_at(goal, rows))
+            gaps, rates, _ = self.subset(rows).gaps(unknowns, coordinates_at(goal, rows))
             return largest(gaps), lambda unsolved: solve(rates[unsolved], gaps[unsolved])
 
         return equations

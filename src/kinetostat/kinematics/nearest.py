@@ -75,7 +75,7 @@ def nearest_home(problems: Problems, unknowns: Array, goal: Coordinates) -> Arra
     best = unknowns.copy()
     if not len(best):
         return best
-    rates = problems.gaps(best, goal)[1]
+    rates = problems.gaps(best, goal).rates
     rows = np.flatnonzero(~_surely_held(rates))
     rows = rows[_idle_freedoms(rates[rows]) > 0]
     share, slope_before = np.ones(len(rows)), np.full(len(rows), np.inf)
@@ -116,7 +116,7 @@ def _idle_freedoms(rates: Array) -> Array:
 
 def _posture_steps(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[Array, Array]:
     """Newton's steps along the idle motions [n x unknowns], and the slopes along these that are left [n]."""
-    rates = problems.gaps(unknowns, goal)[1]
+    rates = problems.gaps(unknowns, goal).rates
     left, sizes, right = np.linalg.svd(rates)
     idle = _idle_freedoms(rates)
     steps, largest_slopes = np.zeros_like(unknowns), np.zeros(len(unknowns))
@@ -150,7 +150,7 @@ def _curvature_along(problems: Problems, unknowns: Array, goal: Coordinates, mot
     curvature = np.broadcast_to(np.eye(size), (count, size, size)).copy()
     for k in range(size):
         shift = CURVATURE_STEP * motions[:, k]
-        change = problems.gaps(unknowns + shift, goal)[1] - problems.gaps(unknowns - shift, goal)[1]
+        change = problems.gaps(unknowns + shift, goal).rates - problems.gaps(unknowns - shift, goal).rates
         curvature[:, k] -= np.einsum("nr,nrc,nic->ni", loads, change, motions) / (2.0 * CURVATURE_STEP)
     return curvature
 
@@ -224,8 +224,9 @@ class _Search:
         dampings, of which the one that leads nearest is kept. The search ends when the next step would gain less than
         people see in the numbers.
         """
-        start = np.zeros(self.problems.size)
-        best, damping = _Place(start, *(each[0] for each in self.problems.gaps(start[None], self.home))), FIRST_DAMPING
+        start, damping = np.zeros(self.problems.size), FIRST_DAMPING
+        at_home = self.problems.gaps(start[None], self.home)
+        best = _Place(start, at_home.gaps[0], at_home.rates[0])
         for _ in range(MOST_POSE_STEPS):
             dampings = damping * DAMPINGS
             steps, loads, settled = self._steps(best, dampings)
@@ -269,7 +270,7 @@ class _Search:
             loads: Lagrange's multipliers, see `_steps` [rows].
         """
         problems = self.problems.subset(np.zeros(allowed.shape[1], dtype=int))
-        rates_beside = problems.gaps(place.unknowns + CURVATURE_STEP * allowed.T, self.home)[1]
+        rates_beside = problems.gaps(place.unknowns + CURVATURE_STEP * allowed.T, self.home).rates
         of_legs = np.einsum("r,nrc->nc", loads, rates_beside - place.rates) @ allowed / CURVATURE_STEP
         return np.asarray(allowed[self.rows].T @ allowed[self.rows] + 0.5 * (of_legs + of_legs.T))
 
@@ -294,7 +295,7 @@ class _Search:
         gaps, rates = np.zeros((count, problems.rows)), np.zeros((count, problems.rows, problems.size))
 
         def equations(unknowns: Array, rows: Integers) -> tuple[Array, Steps]:
-            gaps[rows], rates[rows] = problems.subset(rows).gaps(unknowns, self.home)
+            gaps[rows], rates[rows], _ = problems.subset(rows).gaps(unknowns, self.home)
             return largest(gaps[rows]), lambda unsolved: least_norm(rates[rows[unsolved]], gaps[rows[unsolved]])
 
         end = newton(
