@@ -143,6 +143,8 @@ def machine_program_of(recipe: Recipe) -> Program:
 
 
 def _machine_code(recipe: Recipe) -> MachineCode:
+    """Return the machine code of a recipe, from the disk or compiled."""
+
     def compile_recipe() -> MachineCode:
         formula = recipe.formula()
         return machine_code_of(with_gradients(formula.body, formula.inputs))

@@ -30,7 +30,7 @@ from kinetostat.equilibrium.cables import cable_numbers
 from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.equilibrium.limit import snap_flags
 from kinetostat.equilibrium.numbers import RestNumber, loaded_numbers, status_with_rest
-from kinetostat.equilibrium.state import check_loads, states_at
+from kinetostat.equilibrium.state import MachineState, check_loads, states_at
 from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, rest_numbers
 from kinetostat.kinetostatics.response import Response
@@ -130,14 +130,14 @@ def _fill_with_unknowns(machine: Machine, paths: Sequence[str], quantities: Sequ
     """Return the fill of such quantities, which may leave vibrations unknown at poses that are said to be OK."""
     if way is Way.CABLES:
         return partial(_fill_of_cables, machine, tuple(quantities))
-    plain = way in (Way.ANY_MACHINE, Way.MODES, Way.COLUMNS)
-    solved = partial(_solve_in_parts, machine, tuple(quantities), (way if plain else Way.ANY_MACHINE).slab)
-    if plain or not have_programs(machine, tuple(paths), quantities):
-        return solved
+    by_solver = way in (Way.ANY_MACHINE, Way.MODES, Way.COLUMNS)
+    solver_fill = partial(_solve_in_parts, machine, tuple(quantities), (way if by_solver else Way.ANY_MACHINE).slab)
+    if by_solver or not have_programs(machine, tuple(paths), quantities):
+        return solver_fill
     cut = _cut(machine, tuple(paths)) if rest_numbers(machine, quantities) else None
     counts = _mode_counts(machine, tuple(paths), tuple(quantities))
-    directly = ModalFill(machine, paths, quantities, counts) if counts else _direct_fill(machine, paths, quantities)
-    composed = FallingBack(directly, lambda: solved)
+    by_programs = ModalFill(machine, paths, quantities, counts) if counts else _direct_fill(machine, paths, quantities)
+    composed = FallingBack(by_programs, lambda: solver_fill)
 
     def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         if cut:
@@ -203,14 +203,7 @@ def _response_with_states(
     if any(quantity.cut for quantity in wanted):
         pressure = state.machine.tables["cutting"].pressure
         response = replace(response, softest=cut_receptances(state), cutting_pressure=pressure)
-    of_cables = [quantity.name for quantity in wanted if quantity.cables]
-    if of_cables:
-        numbers, cable_status = cable_numbers(state.machine, of_cables, count)
-        free = np.broadcast_to(response.status, (count,))
-        status = np.where(
-            (free == Status.OK) | (free == Status.SINGULAR) & (cable_status == Status.NO_REST), cable_status, free
-        )
-        response = replace(response, cables=numbers, status=status)
+    response = _response_with_cables(state, response, [quantity.name for quantity in wanted if quantity.cables])
     plan = plan_for(machine, quantities, columns)
     response = response_in_motion(state.machine, response, state.joints, plan, quantities)
     if at_rest := rest_numbers(machine, quantities):
@@ -220,6 +213,19 @@ def _response_with_states(
         status = status_with_rest(machine, quantities, response.status, status)
         response = replace(response, loaded={name: values.T for name, values in loaded.items()}, status=status)
     return response
+
+
+def _response_with_cables(state: MachineState, response: Response, names: Sequence[str]) -> Response:
+    """Return the response with these quantities of cables, and with their status where the pose itself has an answer.
+
+    A singular pose, at which the free machine has none, is NO_REST if its cables are.
+    """
+    if not names:
+        return response
+    numbers, of_cables = cable_numbers(state.machine, names, state.count)
+    of_pose = np.broadcast_to(response.status, (state.count,))
+    cables_decide = (of_pose == Status.OK) | (of_pose == Status.SINGULAR) & (of_cables == Status.NO_REST)
+    return replace(response, cables=numbers, status=np.where(cables_decide, of_cables, of_pose))
 
 
 class _ModalRows(NamedTuple):

@@ -127,6 +127,7 @@ def _condition_of(results: Sequence[Operand]) -> tuple[Condition | None, list[Op
 
 
 def _expression(node: Node, written: dict[int, str]) -> str:
+    """Write the operation of a node on its operands, of which all have been written, by their numbers."""
     form = NOTATION[node.operation]
     operands = [_operand(operand, written) for operand in node.operands]
     if not CALL.match(form):

@@ -140,9 +140,11 @@ def _counts_above(code: LoopCode, numbers: Sequence[Value], matrix: Tridiagonal)
     end = parts * ROWS_BETWEEN_SCALINGS
     start = SturmSequence(last=code.number(1.0), before_last=code.number(0.0), equal_signs=code.number(0.0))
     with code.loop(0, end, [*start] * len(numbers), ROWS_BETWEEN_SCALINGS) as loop:
-        continued = _continued(code, numbers, _sequences_of(loop.values), matrix, loop.index, ROWS_BETWEEN_SCALINGS)
+        continued = _sequences_after(
+            code, numbers, _sequences_of(loop.values), matrix, loop.index, ROWS_BETWEEN_SCALINGS
+        )
         loop.after = [value for sequence in continued for value in sequence]
-    whole = _continued(code, numbers, _sequences_of(loop.values), matrix, str(end), remaining_rows)
+    whole = _sequences_after(code, numbers, _sequences_of(loop.values), matrix, str(end), remaining_rows)
     return [sequence.equal_signs for sequence in whole]
 
 
@@ -152,7 +154,7 @@ def _sequences_of(values: Sequence[Value]) -> list[SturmSequence]:
     return [SturmSequence(*values[first : first + size]) for first in range(0, len(values), size)]
 
 
-def _continued(
+def _sequences_after(
     code: LoopCode,
     numbers: Sequence[Value],
     sequences: Sequence[SturmSequence],

@@ -9,6 +9,7 @@ Source: theory (35)-(38). Units, axes and origin are those of `mechanism`.
 
 from collections.abc import Iterator, Sequence
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -334,33 +335,44 @@ def motion_of(mechanism: Mechanism, step: Array) -> Array:
 def balance(mechanism: Mechanism, state: State) -> Balance:
     """Evaluate the equations of equilibrium at a state."""
     ways = mechanism.ways
-    load, change = platform_load(mechanism, state.platform)
-    poses = len(load)
-    amounts = mechanism.given_amounts(state.amounts)
-    terms: dict[int, LegTerms] = {}
-    gaps: dict[int, Array] = {}
-    for legs in mechanism.like_legs:
-        driven = np.concatenate([amounts[:, given] for given in legs.given])
-        coordinates, wrenches = (
-            np.concatenate([of[k] for k in legs.numbers]) for of in (state.coordinates, state.wrenches)
-        )
-        count = len(legs.numbers)
-        alike = leg_terms(legs.leg, coordinates, wrenches, driven, np.tile(mechanism.gravity, (count, 1)))
-        gap = closing_gap(state.platform.at(np.tile(np.arange(poses), count)), alike.end)
-        for place, number in enumerate(legs.numbers):
-            rows = slice(poses * place, poses * (place + 1))
-            terms[number], gaps[number] = alike.of(rows, legs.given[place], amounts.shape[1]), -gap[rows] @ ways
-    numbers = range(len(mechanism.legs))
-    residuals_of_legs = [part for k in numbers for part in (terms[k].residual, gaps[k])]
+    load, load_change = platform_load(mechanism, state.platform)
+    placed_legs = _placed_legs(mechanism, state)
     carried = sum(state.wrenches, np.zeros_like(load))
+    of_legs = [part for leg in placed_legs for part in (leg.terms.residual, -leg.gap @ ways)]
     return Balance(
         mechanism=mechanism,
         state=state,
-        legs=tuple(terms[k] for k in numbers),
-        residual=np.concatenate([(carried - load) @ ways, *residuals_of_legs], axis=1),
+        legs=tuple(leg.terms for leg in placed_legs),
+        residual=np.concatenate([(carried - load) @ ways, *of_legs], axis=1),
         load=load,
-        load_change=change,
+        load_change=load_change,
     )
+
+
+class _PlacedLeg(NamedTuple):
+    """What a leg contributes to the equations, and the screw by which its end misses the platform [n x 6]."""
+
+    terms: LegTerms
+    gap: Array
+
+
+def _placed_legs(mechanism: Mechanism, state: State) -> list[_PlacedLeg]:
+    """Place all legs at a state; legs of one form are evaluated together."""
+    poses, amounts = len(mechanism.length), mechanism.given_amounts(state.amounts)
+    by_number: dict[int, _PlacedLeg] = {}
+    for legs in mechanism.like_legs:
+        count = len(legs.numbers)
+        driven = np.concatenate([amounts[:, given] for given in legs.given])
+        coordinates, wrenches = (
+            np.concatenate([values[number] for number in legs.numbers])
+            for values in (state.coordinates, state.wrenches)
+        )
+        together = leg_terms(legs.leg, coordinates, wrenches, driven, np.tile(mechanism.gravity, (count, 1)))
+        gaps = closing_gap(state.platform.at(np.tile(np.arange(poses), count)), together.end)
+        for place, number in enumerate(legs.numbers):
+            rows = slice(poses * place, poses * (place + 1))
+            by_number[number] = _PlacedLeg(together.of(rows, legs.given[place], amounts.shape[1]), gaps[rows])
+    return [by_number[number] for number in range(len(mechanism.legs))]
 
 
 def loaded_links(equations: Balance, legs: tuple[Leg, ...], origin: Vector) -> tuple[DeflectedLink, ...]:

@@ -88,12 +88,12 @@ class Units:
     def points(self, points: Sequence[Vector]) -> Array:
         """Points [n x m x 3]."""
         rows = [of_scalars((point - self.origin).components(), self.count) * self.per_metre for point in points]
-        return self._stack(rows, 3)
+        return self.vectors(rows, 3)
 
     def forces(self, forces: Sequence[Vector]) -> Array:
         """Forces [n x m x 3]."""
         rows = [of_scalars(force.components(), self.count) * (1.0 / self.force)[:, None] for force in forces]
-        return self._stack(rows, 3)
+        return self.vectors(rows, 3)
 
     def masses(self, weights: Sequence[Weight]) -> Masses:
         """Masses in units of force per m/s²."""
@@ -109,7 +109,7 @@ class Units:
             point=self.points([weight.point for weight in weights]),
             mass=mass,
             uncoupled=mass * uncoupled_shares,
-            inertia=self._stack([tensor * (per_newton * self.per_metre * self.per_metre) for tensor in tensors], 6),
+            inertia=self.vectors([tensor * (per_newton * self.per_metre * self.per_metre) for tensor in tensors], 6),
         )
 
     def inertia(self, number: Scalar, turns: bool) -> Array:
@@ -128,9 +128,13 @@ class Units:
         unit = self.force if spring.joint.point is None else self.force * self.length
         return of_scalars([load], self.count)[:, 0] * (1.0 / unit)
 
-    def _stack(self, rows: Sequence[Array], width: int) -> Array:
-        """Arrays [n x width] as one [n x m x width], also where there are none."""
-        return np.stack(rows, axis=1) if rows else np.zeros((len(self.length), 0, width))
+    def columns(self, numbers: Sequence[Array]) -> Array:
+        """Numbers at the poses, m arrays [n], as one [n x m], also where there are none."""
+        return np.stack(numbers, axis=1) if numbers else np.zeros((len(self.length), 0))
+
+    def vectors(self, vectors: Sequence[Array], width: int) -> Array:
+        """Vectors at the poses, m arrays [n x width], as one [n x m x width], also where there are none."""
+        return np.stack(vectors, axis=1) if vectors else np.zeros((len(self.length), 0, width))
 
 
 @dataclasses.dataclass
@@ -185,7 +189,7 @@ class _LegReader:
     counts_without_growth: list[int] = field(default_factory=list)
 
     def read(self, chain: Sequence[Element]) -> dict[int, Joint]:
-        """Add all elements and links; gives the passive joints by the numbers of their coordinates."""
+        """Add all elements and links, and return the passive joints by the numbers of their coordinates."""
         joints: dict[int, Joint] = {}
         self._count_motions(0)
         for number, element in enumerate(chain, 1):
@@ -255,6 +259,7 @@ class _LegReader:
         self._add_motion(-self.units.twist(far, rate), coordinate)
 
     def _add_spring(self, spring: Spring, number: int) -> None:
+        """Add a spring of the element with this number: its drive, if it has one, and what deflects."""
         twist = self.units.twist(spring.joint)
         if is_zero(spring.stiffness):
             self._add_motion(twist, self._new_coordinate(None))
@@ -296,7 +301,7 @@ def elastic_leg(
     row = _LegReader(units, amounts, travels, links)
     joints = row.read(leg.chain)
     count, size, weights = len(units.length), len(row.springs), row.weights()
-    twists = np.stack(row.twists, axis=1) if row.twists else np.zeros((count, 0, 6))
+    twists = units.vectors(row.twists, 6)
     chain = Chain(twists, tuple(row.coordinate), tuple(row.given), size)
     idle = np.zeros((count, size, size))
     if units.count is not None:
@@ -305,8 +310,8 @@ def elastic_leg(
         name=leg.name,
         chain=chain,
         springs=tuple(row.springs),
-        stiffness=np.stack(row.stiffness, axis=1) if row.stiffness else np.zeros((count, 0)),
-        preload=np.stack(row.preload, axis=1) if row.preload else np.zeros((count, 0)),
+        stiffness=units.columns(row.stiffness),
+        preload=units.columns(row.preload),
         sign=np.array([SIGNS[spring.acts] if spring else 0.0 for spring in row.springs]),
         idle=idle,
         masses=units.masses(weights),

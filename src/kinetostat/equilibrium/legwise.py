@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kinetostat.algebra.scalar import Scalar, is_zero, sqrt, total, where
+from kinetostat.algebra.scalar import Scalar, inner_product, is_zero, sqrt, total, where
 from kinetostat.algebra.solve import Eliminated, Row, conjugate, definite, elimination, right_inverse, semidefinite_root
 from kinetostat.arrays import Array
 from kinetostat.equilibrium.balance import LegTerms, leg_terms, platform_load
@@ -169,7 +169,7 @@ class CondensedLeg:
             array_of([self._factors.forward(row) for row in rows.tolist()], len(rows), count)
             for rows in (self.spring_loads, self._coupling, self._spring_residual[None])
         )
-        shrink = np.array([*self._factors.shrink, None], dtype=object)[:-1]
+        shrink = of_scalars(self._factors.shrink)[0]
         solved, driven = loads * shrink, coupled * shrink
         self.lines = self.wrenches + product(product(solved, coupled.T), self.passive_by_twist)
         self.gap = self.lines @ self._opening + product(solved, remaining[0])
@@ -177,7 +177,7 @@ class CondensedLeg:
             soft = symmetric_product(loads, solved.T).tolist()
             self.roots = array_of(semidefinite_root(soft), len(loads), len(loads))
         else:
-            self.roots = loads * np.array([*(sqrt(abs(part)) for part in shrink), None], dtype=object)[:-1]
+            self.roots = loads * of_scalars([sqrt(abs(part)) for part in shrink])[0]
         stiffening = self._inner - symmetric_product(driven, coupled.T)
         by_twist = self.passive_by_twist
         self.turning = symmetric_product(by_twist.T, product(stiffening, by_twist)) + self._bracket
@@ -296,7 +296,7 @@ def _shared_by_least_energy(lines: Array, roots: Array, gaps: Array) -> tuple[Ar
     balanced, internal, margin = right_inverse(lines.T.tolist())
     mixes = np.array([*zip(*balanced, strict=True), *internal], dtype=object)
     with_springs = np.concatenate([product(mixes, roots), mixes], axis=1)
-    squares = [total([part * part for part in column]) for column in roots.T.tolist()]
+    squares = [inner_product(column, column) for column in roots.T.tolist()]
     squares = [1.0 if is_zero(square) else where(square > ZERO_PIVOT, square, 1.0) for square in squares]
     modes = conjugate(with_springs[size:].tolist(), [1.0] * count, squares)
     answers, internal_changes = with_springs[:size], np.full(len(lines), 0.0, dtype=object)
@@ -381,10 +381,10 @@ class LegwiseTangent:
     @property
     def stable(self) -> Scalar:
         """Whether the tangent stiffness is positive definite by a margin, and all ranks are sure."""
-        good = self._solved.stable
+        result = self._solved.stable
         for leg in self.legs:
-            good = good & leg.sure
-        return good
+            result = result & leg.sure
+        return result
 
     def actuator_loads(self) -> list[tuple[Spring, Scalar]]:
         """Every actuator with what it carries after the step, N or N·m, positive where it is pulled open."""

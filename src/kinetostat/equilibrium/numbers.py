@@ -150,22 +150,31 @@ def loaded_numbers(
     equations, stability = states.equations, states.stability
     if equations is None or stability is None:
         return result, states.status
-    compliances = platform_compliance(equations) * equations.mechanism.compliance_units
-    parts = np.array(state.machine.family.components)
-    stiffness = np.full((len(equations.residual), 6), np.nan)
-    stiffness[:, parts] = np.diagonal(stiffness_of(compliances[:, parts[:, None], parts]), axis1=1, axis2=2)
-    pairs = zip(equations.mechanism.legs, equations.legs, strict=True)
-    slack = np.sum([((leg.sign != 0.0) & (terms.carrying == 0.0)).sum(axis=1) for leg, terms in pairs], axis=0)
-    numbers = {
-        "displacement": equations.state.platform.amounts() * equations.mechanism.twist_units,
-        "compliance": np.diagonal(compliances, axis1=1, axis2=2),
-        "stiffness": stiffness,
-        "slack": slack,
-        "factor": stability.factor,
-    }
+    numbers = _numbers_at_rest(equations, np.array(state.machine.family.components)) | {"factor": stability.factor}
     numbers |= {name: compute(equations) for name, compute in (further or {}).items()}
     for name, values in numbers.items():
         whole = result.setdefault(name, np.full((count, *values.shape[1:]), np.nan))
         whole[states.rows] = values[stability.stable]
     carried = np.array([load for _, load in states.loads]).reshape(-1, count).T
     return result | greatest_loads(states.loads) | {"drive_loads": carried}, states.status
+
+
+def _numbers_at_rest(equations: Balance, components: Integers) -> dict[str, Array]:
+    """Return the numbers of `loaded_numbers` that follow from the equations at rest.
+
+    Args:
+        equations: the equations at n states of rest.
+        components: numbers of the components of twists that the machine has; along the others stiffness is NaN.
+    """
+    mechanism = equations.mechanism
+    compliances = platform_compliance(equations) * mechanism.compliance_units
+    stiffness = np.full((len(equations.residual), 6), np.nan)
+    of_components = stiffness_of(compliances[:, components[:, None], components])
+    stiffness[:, components] = np.diagonal(of_components, axis1=1, axis2=2)
+    pairs = zip(mechanism.legs, equations.legs, strict=True)
+    return {
+        "displacement": equations.state.platform.amounts() * mechanism.twist_units,
+        "compliance": np.diagonal(compliances, axis1=1, axis2=2),
+        "stiffness": stiffness,
+        "slack": np.sum([((leg.sign != 0.0) & (terms.carrying == 0.0)).sum(axis=1) for leg, terms in pairs], axis=0),
+    }

@@ -305,6 +305,7 @@ def joints_of(configuration: Configuration) -> list[LoadedJoint]:
 
 
 def _joints_of_leg(number: int, chain: tuple[object, ...]) -> Iterator[LoadedJoint]:
+    """Give the joints of a leg; elements of one name in a row, as the springs of a hinge, are one joint."""
     last = ""
     for place, element in enumerate(chain):
         mover = element if isinstance(element, Joint) else element.joint if isinstance(element, Spring) else None

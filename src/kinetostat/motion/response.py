@@ -70,17 +70,24 @@ def lost_motion_of_joints(machine: "RigidMachine", response: Response) -> list[S
     lost: list[list[Scalar]] = [[0.0] for _ in range(SIZE)]
     first = 0
     for rigid_leg, leg, screws in zip(machine.legs, response.configuration.legs, response.legs, strict=True):
-        if any(not is_zero(part.coulomb) for part in rigid_leg.friction):
-            spring_numbers = range(first, first + len(leg.springs))
-            loads = [response.statics.flexibility[number].components() for number in spring_numbers]
-            for component, tool_motion in enumerate(tool_motions):
-                # Springs between the joints and the tool move the tool, not the joints.
-                joint_motion = tool_motion
-                for spring, twist, number, load in zip(leg.springs, screws.elastic, spring_numbers, loads, strict=True):
-                    if not (spring.actuated or spring.hinge):
-                        joint_motion = joint_motion - twist * (compliances[number] * load[component])
-                lost[component].append(_lost_motion_of_leg(rigid_leg, joint_motion, machine.length))
-        first += len(leg.springs)
+        springs = slice(first, first + len(leg.springs))
+        first = springs.stop
+        if all(is_zero(part.coulomb) for part in rigid_leg.friction):
+            continue
+        # Springs between the joints and the tool move the tool, not the joints.
+        shares = zip(
+            leg.springs, screws.elastic, compliances[springs], response.statics.flexibility[springs], strict=True
+        )
+        beyond_joints = [
+            (twist, compliance, load.components())
+            for spring, twist, compliance, load in shares
+            if not (spring.actuated or spring.hinge)
+        ]
+        for component, tool_motion in enumerate(tool_motions):
+            joint_motion = tool_motion
+            for twist, compliance, load in beyond_joints:
+                joint_motion = joint_motion - twist * (compliance * load[component])
+            lost[component].append(_lost_motion_of_leg(rigid_leg, joint_motion, machine.length))
     return [total(row) for row in lost]
 
 

@@ -247,6 +247,7 @@ def rigid_machine(machine: Machine, mechanism: Mechanism, plan: MotionPlan, orig
 
 
 def _drive(spring: Spring, machine: Machine, length: Scalar) -> RigidDrive:
+    """Read the drive of an actuator; forces of slides are in N, and moments in N times the length."""
     numbers, slides = numbers_of_drive(machine, "drives", spring), spring.joint.point is None
     turns = rotor_turns(spring, numbers)
     turns = turns * length if slides else turns  # coordinates of slides are in units of the length
@@ -263,11 +264,12 @@ def _drive(spring: Spring, machine: Machine, length: Scalar) -> RigidDrive:
 
 
 def _mass_points(masses: Masses, length: Scalar) -> tuple[MassPoint, ...]:
-    rows = []
+    """Take masses apart, point by point, with their inertia in kg times the length, m."""
+    points = []
     for number, name in enumerate(masses.names):
         xx, yy, zz, xy, xz, yz = (entry * length for entry in masses.inertia[0, number].tolist())
         without_inertia = all(is_zero(entry) for entry in (xx, yy, zz, xy, xz, yz))
-        rows.append(
+        points.append(
             MassPoint(
                 name=name,
                 carried=masses.carried[number],
@@ -277,7 +279,7 @@ def _mass_points(masses: Masses, length: Scalar) -> tuple[MassPoint, ...]:
                 tensor=() if without_inertia else (Vector(xx, xy, xz), Vector(xy, yy, yz), Vector(xz, yz, zz)),
             )
         )
-    return tuple(rows)
+    return tuple(points)
 
 
 def _passive_coordinates(leg: ElasticLeg) -> list[int]:
@@ -293,6 +295,7 @@ def _passive_coordinates(leg: ElasticLeg) -> list[int]:
 
 
 def _rigid_leg(leg: ElasticLeg, plan: LegFreedoms, machine: Machine, mechanism: Mechanism) -> RigidLeg:
+    """Make the rigid leg of a leg of the mechanism, with the freedoms that the plan gives it."""
     screws = tuple(Twist.of(row) for row in leg.chain.twists[0].tolist())
     coordinates, drives = _coordinates_of_motions(leg, plan.moving, len(mechanism.driven))
     columns = _jacobian_columns(screws, coordinates, len(plan.moving) + len(drives))
@@ -388,7 +391,7 @@ def _freedoms_of(leg: ElasticLeg, drives: int) -> tuple[LegFreedoms, list[Row]]:
         # Of motions that depend on each other, the passive one that the others replace best stands still; of equal
         # ones the last.
         shares = np.abs(dependences[rank:, : len(passive)]).max(axis=0)
-        passive.pop(len(passive) - 1 - int(np.argmax(shares[::-1] > shares.max() - DEPENDENT)))
+        passive.pop(int(np.flatnonzero(shares > shares.max() - DEPENDENT)[-1]))
     redundant = len(columns) > rank
     freedoms = LegFreedoms(tuple(passive), redundant, _balls(screws, coordinates, len(passive)))
     return freedoms, _rates_and_constraints(columns, redundant)[1]
@@ -426,6 +429,7 @@ def _balls(screws: Sequence[Twist], coordinates: Sequence[int], passive: int) ->
 
 
 def _meet_in_a_point(screws: Sequence[Twist]) -> bool:
+    """Tell whether the axes of three turns span the space and meet in a point."""
     axes = np.array([screw.rotational.components() for screw in screws], dtype=float)
     moments = np.array([screw.translational.components() for screw in screws], dtype=float)
     if abs(np.linalg.det(axes)) < DEPENDENT:

@@ -374,6 +374,7 @@ def _settled_shapes(inverse_squares: Array, shapes: Array, motions: Array, lengt
 
 
 def _drives(equations: Balance, shapes: Array) -> Iterator[Drive]:
+    """Give the deflections of actuators' springs in modes of these shapes."""
     mechanism = equations.mechanism
     length, joule = float(mechanism.length[0]), float(mechanism.force[0] * mechanism.length[0])
     for leg, places in zip(mechanism.legs, mechanism.motion_places.coordinates, strict=True):
