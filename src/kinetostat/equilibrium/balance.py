@@ -350,7 +350,7 @@ def balance(mechanism: Mechanism, state: State) -> Balance:
 
 
 class _PlacedLeg(NamedTuple):
-    """What a leg contributes to the equations, and the screw by which its end misses the platform [n x 6]."""
+    """Contribution of a leg to the equations, and the screw by which its end misses the platform [n x 6]."""
 
     terms: LegTerms
     gap: Array
