@@ -132,7 +132,7 @@ def test_what_was_given_is_read_by_the_kind_of_the_option():
     given = {"count": "12", "load": "1.5", "quick": True, "way": "other", "poses": ["../a.csv"], "name": "a"}
     values = values_of(QUESTION, given)
     assert values == {
-        "count": 12, "load": 1.5, "quick": True, "way": "other", "poses": [Path("sent/a.csv")], "name": "a",
+        "count": 12, "load": 1.5, "quick": True, "way": "other", "poses": [Path("sent/poses/a.csv")], "name": "a",
     }  # fmt: skip
     assert in_words_of_the_page(QUESTION, "load is low; give --count") == 'load is low; give "count"'
 
@@ -172,6 +172,14 @@ def test_files_that_were_sent_are_listed():
         assert page.one("sent poses").text == "a.csv, b.csv"
 
     on_page(steps, MACHINE)
+
+
+def test_files_of_one_name_for_two_options_are_two_files():
+    poses, fit = Option("poses", "file", "a file of poses"), Option("fit", "file", "a record of a fit")
+    form = tab.QuestionForm(Question("", modes, (poses, fit)))
+    form.files = {"poses": {"data": b"1"}, "fit": {"data": b"2"}}
+    values = values_of(form.question, form.entries())
+    assert [form.sent_files()[values[name]] for name in ("poses", "fit")] == [b"1", b"2"]
 
 
 def test_texts_of_a_machine_file_never_become_markup():

@@ -19,7 +19,7 @@ from kinetostat.machine.parameters import doubts
 from kinetostat.spec.errors import InputError, choice, shorten
 from kinetostat.studies.storage import write_text
 from kinetostat.studio.processes import REFUSED, limit_process
-from kinetostat.studio.wording import paragraph, table
+from kinetostat.studio.wording import heading, paragraph, table
 from kinetostat.views.answers import description_of, write_form
 from kinetostat.views.figures import as_svg
 from kinetostat.views.question import Description, Drawing, Option, Question, late
@@ -37,12 +37,17 @@ ANSWER_STEM = "answer"
 """Stem of the names of the answer's other files."""
 MACHINE_FILE = "machine.toml"
 UPLOAD_FOLDER = "sent"
-"""Folder of the files that were sent, within that of the process."""
+"""Folder of the files that were sent, within that of the process; each option has a folder in it."""
 
 
 def label_of(option: Option) -> str:
     """Return the name of an option as the page writes it."""
     return option.name.replace("_", " ")
+
+
+def upload_path(option: Option, name: str) -> Path:
+    """Return the path of a file that was sent for an option, within the folder of the process."""
+    return Path(UPLOAD_FOLDER) / option.name / Path(name).name
 
 
 def in_words_of_the_page(question: Question, text: str) -> str:
@@ -55,27 +60,27 @@ def in_words_of_the_page(question: Question, text: str) -> str:
     return text
 
 
-def values_of(question: Question, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a question takes besides the machine, from what was given in the form.
+def values_of(question: Question, entries: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a question takes besides the machine, from what was filled in.
 
     Args:
         question: the question whose options they are.
-        given: a text, a flag or a list of texts by the name of an option; one that is missing has its default.
+        entries: a text, a flag or a list of texts by the name of an option; one that is missing has its default.
 
     Raises:
         InputError: a text cannot be read, or something that is required is missing.
     """
     values = {}
     for option in question.options:
-        text = given.get(option.name)
-        if text in (None, "", []):
+        entry = entries.get(option.name)
+        if entry in (None, "", []):
             if option.required:
                 raise InputError(f"{label_of(option)} is missing; it is {option.meaning}.")
             values[option.name] = list(option.default or ()) if option.many else option.default
         elif option.many:
-            values[option.name] = [_value(option, str(entry)) for entry in text]
+            values[option.name] = [_value(option, str(text)) for text in entry]
         else:
-            values[option.name] = bool(text) if option.kind == "flag" else _value(option, str(text))
+            values[option.name] = bool(entry) if option.kind == "flag" else _value(option, str(entry))
     return values
 
 
@@ -83,7 +88,7 @@ def _value(option: Option, text: str) -> Any:
     if option.choices:
         return choice(text, option.choices, label_of(option))
     if option.kind == "file":
-        return Path(UPLOAD_FOLDER) / Path(text).name
+        return upload_path(option, text)
     reader: Callable[[str], Any] = READERS.get(option.kind, str)  # type: ignore[assignment]
     try:
         return reader(text)
@@ -102,13 +107,13 @@ def answer_html(description: Description, answer: Any, full: bool) -> str:
         for head, sentence in description.sentences(answer)
     ]
     parts += [paragraph(f"Note: {doubt}") for doubt in doubts(description.machine_of(answer))]
-    for shown in description.tables(answer, full):
-        if isinstance(shown, str):
-            parts.append(paragraph(shown))
+    for part in description.tables(answer, full):
+        if isinstance(part, str):
+            parts.append(paragraph(part))
             continue
-        title = str(shown.title or description.title)
-        rows = as_table(shown, title)
-        parts.append(f"<h3>{escape(title)}</h3>" + table(title, rows.heads, rows.rows, "of-answer", rows.numeric))
+        title = str(part.title or description.title)
+        rows = as_table(part, title)
+        parts.append(heading(title) + table(title, rows.heads, rows.rows, "of-answer", rows.numeric))
     return "".join(parts) + "".join(figure_html(drawing) for drawing in description.drawings(answer).values())
 
 
@@ -119,18 +124,18 @@ def figure_html(drawing: Drawing) -> str:
     return f"<figure>{image}<figcaption>{escape(drawing.caption)}</figcaption></figure>"
 
 
-def ask(request: Mapping[str, Any], tell: Callable[..., None]) -> None:
+def ask(request: Mapping[str, Any], progress: Callable[..., None]) -> None:
     """Ask a question about the machine in this folder, and write its answer there as a page and in every other form.
 
     Args:
         request: its `word`, the `options` that were given, and whether tables show every row (`full`).
-        tell: called as tell(done, total), or as tell(done, total, words), while the question is being answered.
+        progress: called as progress(done, total), or as progress(done, total, words), while it is being answered.
 
     Raises:
         InputError: what the question refuses.
     """
     question: Question = late(QUESTIONS[choice(request["word"], QUESTIONS, "the question")][1])
-    reports = {"progress": tell} if question.reports_progress else {}
+    reports = {"progress": progress} if question.reports_progress else {}
     overrides, arguments = question.arguments(values_of(question, request["options"]))
     try:
         answer = question.answer(load(MACHINE_FILE, overrides), **arguments, **reports)
@@ -143,14 +148,14 @@ def ask(request: Mapping[str, Any], tell: Callable[..., None]) -> None:
     write_text(Path(ANSWER_PAGE), answer_html(description, answer, bool(request["full"])))
 
 
-def _tell(done: int, total: int, _words: str = "") -> None:
+def _print_progress(done: int, total: int, _words: str = "") -> None:
     print(json.dumps({"done": done, "total": total}), flush=True)
 
 
 if __name__ == "__main__":
     limit_process(SECONDS_TO_ANSWER, MEMORY_TO_ANSWER)
     try:
-        ask(json.load(sys.stdin), _tell)
+        ask(json.load(sys.stdin), _print_progress)
     except InputError as refusal:
         print(json.dumps({"refused": str(refusal)}), flush=True)
         sys.exit(REFUSED)

@@ -28,9 +28,9 @@ from kinetostat.studio.question_process import (
     MACHINE_FILE,
     MEMORY_TO_ANSWER,
     SECONDS_TO_ANSWER,
-    UPLOAD_FOLDER,
     in_words_of_the_page,
     label_of,
+    upload_path,
 )
 from kinetostat.studio.session import Session
 from kinetostat.studio.wording import paragraph
@@ -46,14 +46,23 @@ MOST_FILES = 8
 """Files that an option takes at most: designs to compare, of which no more fit side by side."""
 LARGEST_ANSWER = 24 << 20
 """Bytes of an answer that the page shows; a larger one would stop the browser, and is only downloaded."""
+LONGEST_FILE_NAME = 80
+"""Characters of the name of a file that was sent, the last ones, so that its suffix is kept."""
 NAMES_OF_FORMS = {"json": "JSON", "csv": "CSV", "nc": "NetCDF"}
+"""Kinds of files in which an answer can be downloaded, by their suffixes."""
 EVERY_ROW = "full"
 """Name of the switch for tables with every row, which is not an option of a question."""
 
 
 @dataclass
 class QuestionForm:
-    """The form of one question: its elements by the name of an option, and the files that were sent."""
+    """The form of one question.
+
+    Attributes:
+        question: the question.
+        fields: its elements by the name of an option; `EVERY_ROW` has one, too.
+        files: the files that were sent, by the name of an option and their own.
+    """
 
     question: Question
     fields: dict[str, Any] = field(default_factory=dict)
@@ -73,6 +82,14 @@ class QuestionForm:
                 texts[option.name] = self.fields[option.name].value
         return texts
 
+    def sent_files(self) -> dict[Path, bytes]:
+        """Return the files that were sent, by their paths within the folder of the process."""
+        return {
+            upload_path(option, name): data
+            for option in self.question.options
+            for name, data in self.files.get(option.name, {}).items()
+        }
+
     @property
     def full(self) -> bool:
         """Whether tables show every row."""
@@ -90,9 +107,9 @@ class AskTab:
         """
         self._session = session
         self._forms: dict[str, QuestionForm] = {}
-        self._asked: Machine | None = None
+        self._asked: Machine | None = None  # the machine of the answer that is shown or being computed
         self._process: asyncio.subprocess.Process | None = None
-        self._folder: TemporaryDirectory[str] | None = None
+        self._folder: TemporaryDirectory[str] | None = None  # with the files of the answer that is shown
         self._stopped = self._busy = False
         self._questions = Lane(_import_questions, self._offer)
         with ui.element("section").classes("design of-asking left").props('aria-label="question"'):
@@ -149,7 +166,7 @@ class AskTab:
         if form is None:
             return
         kept = {name: element.value for name, element in form.fields.items()}
-        self._refuse("")
+        self._clear_problem()
         self._body.clear()
         with self._body:
             summary = QUESTIONS[str(self.choice.value)][0]
@@ -163,22 +180,23 @@ class AskTab:
             form.fields[name].set_value(value)
 
     def _row(self, form: QuestionForm, option: Option) -> None:
+        """Build the field of an option by its kind."""
         label, meaning = label_of(option), in_words_of_the_page(form.question, option.meaning)
         if option.kind == "file":
             self._file_row(form, option, meaning)
             return
-        made: Any
+        element: Any
         if option.kind == "flag":
-            made = ui.checkbox(label, value=bool(option.default)).props("dense")
+            element = ui.checkbox(label, value=bool(option.default)).props("dense")
         elif option.choices:
-            made = ui.select(list(option.choices), label=label, value=option.default, clearable=not option.required)
+            element = ui.select(list(option.choices), label=label, value=option.default, clearable=not option.required)
         elif option.many:
-            made = ui.textarea(f"{label}, one in each line").props("autogrow")
+            element = ui.textarea(f"{label}, one in each line").props("autogrow")
         else:
-            made = ui.input(label, value="" if option.default in (None, ()) else str(option.default))
+            element = ui.input(label, value="" if option.default in (None, ()) else str(option.default))
         if option.kind != "flag":
-            made.props("dense outlined").classes("field")
-        form.fields[option.name] = made.tooltip(meaning).mark(f"option {option.name}")
+            element.props("dense outlined").classes("field")
+        form.fields[option.name] = element.tooltip(meaning).mark(f"option {option.name}")
 
     def _file_row(self, form: QuestionForm, option: Option, meaning: str) -> None:
         """Build the field of an option that takes a file: the names of those that were sent, and a button for more."""
@@ -186,7 +204,9 @@ class AskTab:
             ui.label(label_of(option)).classes("form-name").tooltip(meaning)
             names = ui.label(", ".join(form.files.get(option.name, ()))).classes("form-fixed")
             names.mark(f"sent {option.name}")
-            upload = upload_field(partial(self._take, form, option, names), self._refuse, f"upload {option.name}", "")
+            upload = upload_field(
+                partial(self._take, form, option, names), self._show_problem, f"upload {option.name}", ""
+            )
             icon_button("upload_file", f"Send a file: {label_of(option)}", lambda: upload.run_method("pickFiles"), "")
 
     async def _take(
@@ -201,50 +221,52 @@ class AskTab:
         if isinstance(event.sender, ui.upload):
             event.sender.reset()
 
-    def _refuse(self, message: str) -> None:
+    def _show_problem(self, message: str) -> None:
         self.problem.set_text(message)
+
+    def _clear_problem(self) -> None:
+        self.problem.set_text("")
 
     def _ask(self) -> None:
         form = self._forms.get(str(self.choice.value))
         if form is None or self._busy:
             return
-        self._refuse("")
+        self._clear_problem()
         machine = self._session.machine
         self._asked, self._stopped = machine, False
         request = {"word": str(self.choice.value), "options": form.entries(), EVERY_ROW: form.full}
-        sent = {name: data for files in form.files.values() for name, data in files.items()}
         self._show_busy(True)
         if self._folder is None:  # nothing has been answered yet
             self.answer.set_content("")
-        background_tasks.create(self._answer(machine, request, sent), name="studio question")
+        background_tasks.create(self._answer(machine, request, form.sent_files()), name="studio question")
 
-    async def _answer(self, machine: Machine, request: dict[str, Any], sent: dict[str, bytes]) -> None:
+    async def _answer(self, machine: Machine, request: dict[str, Any], files: dict[Path, bytes]) -> None:
         """Ask about a machine in a process, and show its answer or why there is none."""
         folder = TemporaryDirectory()
         try:
             place = Path(folder.name)
-            (place / UPLOAD_FOLDER).mkdir()
             (place / MACHINE_FILE).write_text(as_file(machine), "utf-8")
-            for name, data in sent.items():
-                (place / UPLOAD_FOLDER / name).write_bytes(data)
+            for path, data in files.items():
+                (place / path).parent.mkdir(parents=True, exist_ok=True)
+                (place / path).write_bytes(data)
             async with ASKING.turn(self.button.client.id):
                 problem = await self._run(place, json.dumps(request).encode())
-            shown = "" if problem else await run.io_bound(_read_answer, place / ANSWER_PAGE)
+            content = "" if problem else await run.io_bound(_read_answer, place / ANSWER_PAGE)
         except InputError as error:
-            problem, shown = str(error), ""
+            problem, content = str(error), ""
         finally:
             self._process = None
             self._show_busy(False)
         if problem:
             folder.cleanup()
-            self._refuse(problem)
+            self._show_problem(problem)
             self._asked = None
             if self._folder is None:
                 self.answer.set_content(paragraph(NOTHING_ASKED))
             return
         self._forget()
         self._folder = folder
-        self.answer.set_content(str(shown))
+        self.answer.set_content(str(content))
         for form, button in self.files.items():
             button.set_visibility((place / f"{ANSWER_STEM}.{form}").exists())
         self.note_change()
@@ -258,13 +280,13 @@ class AskTab:
         if self._stopped:
             process.kill()
         make_modest(process.pid)
-        words, answers = process.stdin, process.stdout
-        if words is None or answers is None:
+        requests, reports = process.stdin, process.stdout
+        if requests is None or reports is None:
             raise RuntimeError("the process has no pipes")
-        words.write(request)
-        words.write_eof()
+        requests.write(request)
+        requests.write_eof()
         refusal = ""
-        async for line in answers:
+        async for line in reports:
             report = json.loads(line)
             refusal = report.get("refused", "")
             if report.get("total"):
@@ -286,15 +308,16 @@ class AskTab:
         if self._process is not None and self._process.returncode is None:
             self._process.kill()
 
-    def _show_busy(self, busy: bool) -> None:
-        self._busy = busy
-        self.button.set_enabled(not busy)
-        self.stop.set_enabled(busy)
+    def _show_busy(self, is_busy: bool) -> None:
+        self._busy = is_busy
+        self.button.set_enabled(not is_busy)
+        self.stop.set_enabled(is_busy)
         self.bar.set_value(0.0)
-        self.bar.set_visibility(busy)
-        self.line.set_text("computing ..." if busy else "")
+        self.bar.set_visibility(is_busy)
+        self.line.set_text("computing ..." if is_busy else "")
 
     def _forget(self) -> None:
+        """Delete the files of the answer that was shown."""
         if self._folder is not None:
             self._folder.cleanup()
         self._folder = None
@@ -311,7 +334,7 @@ def _import_questions(words: tuple[str, ...]) -> dict[str, Question]:
 
 def _safe(name: str) -> str:
     """Return the name of a file that was sent without anything that could lead out of its folder."""
-    return re.sub(r"[^\w.-]", "_", Path(name).name).lstrip(".-")[-80:] or "file"
+    return re.sub(r"[^\w.-]", "_", Path(name).name).lstrip(".-")[-LONGEST_FILE_NAME:] or "file"
 
 
 def _read_answer(path: Path) -> str:

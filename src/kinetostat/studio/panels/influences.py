@@ -4,6 +4,7 @@ The numbers come from `studies` and the engine; here they are ranked and written
 """
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from nicegui import ui
@@ -40,9 +41,9 @@ MOST_PARAMETERS = 24
 """Greatest number of parameters that are listed: those of one screen."""
 CURVE_SPAN = 1e3
 """Ratio of the ends of a curve to the present stiffness: it runs from the stiffness over this to it times this."""
-BLOCKS = {"C, translation": ("compliance", "xyz"), "C, rotation": ("compliance", "r"),
-          "K, translation": ("stiffness", "xyz"), "K, rotation": ("stiffness", "r")}  # fmt: skip
-"""Blocks of K and C whose diagonals are drawn: the matrix, and the letters with which their components begin."""
+BLOCKS = {"C, translation": ("compliance", False), "C, rotation": ("compliance", True),
+          "K, translation": ("stiffness", False), "K, rotation": ("stiffness", True)}  # fmt: skip
+"""Blocks of K and C whose diagonals are drawn: the matrix, and whether the components are rotations."""
 
 
 class ContributionsPanel(Panel):
@@ -81,8 +82,7 @@ def contributions_text(report: Report, component: str) -> str:
     shares: dict[str, float] = {}
     for spring in analysis.attribution:
         shares[spring.part] = shares.get(spring.part, 0.0) + float(np.nan_to_num(spring.compliance_share[index]))
-    ranked = sorted(shares.items(), key=lambda item: -item[1])
-    rows = [(part, share, f"{100 * share:.1f} %") for part, share in ranked if share > LEAST_SHARE]
+    rows = _rows_of_shares(sorted(shares.items(), key=lambda item: -item[1]))
     if compliance == 0.0:
         return paragraph(f"The platform is rigid in {component}: no part deflects under this load.")
     if not rows:
@@ -90,10 +90,15 @@ def contributions_text(report: Report, component: str) -> str:
     unit = QUANTITIES[f"compliance_{component}"].unit
     lead = f"Compliance in {component}: {engineering(compliance, unit, analysis.machine.display)}"
     springs = {each.spring: float(np.nan_to_num(each.compliance_share[index])) for each in analysis.attribution}
-    _, together = parts_and_kinds(springs_of(analysis.state.configuration), springs)
-    kinds = [(kind, share, f"{100 * share:.1f} %") for kind, share in together if share > LEAST_SHARE]
-    grouped = bars("contributions by kind of part", kinds) + heading("Part by part") if len(kinds) < len(rows) else ""
-    return paragraph(lead, "lead") + grouped + bars("contributions to the compliance", rows, report.legs)
+    _, shares_of_kinds = parts_and_kinds(springs_of(analysis.state.configuration), springs)
+    kinds = _rows_of_shares(shares_of_kinds)
+    by_kind = bars("contributions by kind of part", kinds) + heading("Part by part") if len(kinds) < len(rows) else ""
+    return paragraph(lead, "lead") + by_kind + bars("contributions to the compliance", rows, report.legs)
+
+
+def _rows_of_shares(shares: Iterable[tuple[str, float]]) -> list[tuple[str, float, str]]:
+    """Return the rows of bars for shares of the compliance, without those that would read 0.0 %."""
+    return [(name, share, f"{100 * share:.1f} %") for name, share in shares if share > LEAST_SHARE]
 
 
 class SensitivityPanel(Panel):
@@ -112,12 +117,8 @@ class SensitivityPanel(Panel):
         offered = map_quantities(report.analysis.machine).items()
         names = {name: text for name, text in offered if name != SINGULARITY}
         if self.quantity.options != names:
-            kept = (
-                self.quantity.value
-                if self.quantity.value in names
-                else FIRST_RANKED.format(report.analysis.components[-1])
-            )
-            self.quantity.set_options(names, value=kept)
+            first = FIRST_RANKED.format(report.analysis.components[-1])
+            self.quantity.set_options(names, value=self.quantity.value if self.quantity.value in names else first)
         self._ask()
 
     def close(self) -> None:
@@ -143,12 +144,9 @@ def ranking_text(answer: Sensitivity) -> str:
     if not rows:
         return paragraph(answer.message or "No parameter changes this quantity at this pose.")
     note = "Change of the quantity in percent, per percent of the parameter; of an angle, per 0.01 rad."
-    more = (
-        f" {len(pairs) - MOST_PARAMETERS} parameters with less effect are omitted."
-        if len(pairs) > MOST_PARAMETERS
-        else ""
-    )
-    return bars("sensitivities", rows) + paragraph(note + more)
+    if len(pairs) > MOST_PARAMETERS:
+        note += f" {len(pairs) - MOST_PARAMETERS} parameters with less effect are omitted."
+    return bars("sensitivities", rows) + paragraph(note)
 
 
 class LinkPanel(Panel):
@@ -183,20 +181,20 @@ class LinkPanel(Panel):
         path = str(self.field.value)
         value = self._session.value(path)
         middle = value if 0.0 < value < math.inf else USUAL_STIFFNESS
-        matrix, letters = BLOCKS[str(self.block.value)]
-        names = [n for n in self._session.machine.family.component_names if (n[0] == "r") == (letters == "r")]
-        quantities = tuple(f"{matrix}_{name}" for name in names)
+        matrix, is_rotation = BLOCKS[str(self.block.value)]
+        names = self._session.machine.family.component_names
+        quantities = tuple(f"{matrix}_{name}" for name in names if name.startswith("r") is is_rotation)
         ends = Ends(path, middle / CURVE_SPAN, middle * CURVE_SPAN)
         self._lane.ask(CurveRequest(self._session.machine, ends, quantities))
 
     def _draw(self, request: CurveRequest, answer: Curves) -> None:
+        """Draw the curves of a request, whose block and field need not be those that are chosen by now."""
         if self._session is None or request.field.path not in self._session.controls:
             return
         control = self._session.controls[request.field.path]
-        matrix, letters = BLOCKS[str(self.block.value)]
-        units = {"compliance": ("rad/(N·m)", "m/N"), "stiffness": ("N·m/rad", "N/m")}[matrix]
+        matrix = request.quantities[0].partition("_")[0]
         x = self._session.machine.display.scale(KINDS[control.parameter.quantity.kind].unit)
-        y = self._session.machine.display.scale(units[letters != "r"])
+        y = self._session.machine.display.scale(QUANTITIES[request.quantities[0]].unit)
         present = self._session.value(request.field.path) * x.factor
         data = {
             "x": [across * x.factor for across in answer.across],

@@ -38,6 +38,12 @@ from kinetostat.views.tables import headline, requirement_lines
 MATRIX_NAMES = {"C": "compliance", "K": "stiffness"}
 """Matrices by the letter on their button."""
 PRINCIPAL_UNITS = {"translation": "N/m", "rotation": "N·m/rad"}
+"""Units of the principal stiffnesses of a block."""
+NO_REQUIREMENTS = (
+    'The file has no requirements; a table [requirements] with NAME = "free_stiffness_z > 50 N/um" adds one.'
+)
+COPIED_MILLISECONDS = 1500
+"""Time for which the page says that a matrix is copied: long enough to be read, too short to be in the way."""
 
 
 class MatricesPanel(Panel):
@@ -65,7 +71,7 @@ class MatricesPanel(Panel):
     def _copy(self) -> None:
         if self._report is not None:
             ui.clipboard.write(matrix_text(self._report.analysis, str(self.kind.value)))
-            ui.notify(f"{self.kind.value} copied", position="bottom", timeout=1500)
+            ui.notify(f"{self.kind.value} copied", position="bottom", timeout=COPIED_MILLISECONDS)
 
 
 def _rows(analysis: Analysis, kind: str) -> Array | None:
@@ -77,7 +83,7 @@ def _diagonal(analysis: Analysis, kind: str) -> Sequence[float]:
 
 
 def matrix_table(analysis: Analysis, kind: str) -> str:
-    """C or K as a table; only its diagonal where the matrix is not finite.
+    """Return C or K as a table; only its diagonal where the matrix is not finite.
 
     Args:
         analysis: the analysis of one pose.
@@ -101,7 +107,7 @@ def matrix_table(analysis: Analysis, kind: str) -> str:
 
 
 def matrix_text(analysis: Analysis, kind: str) -> str:
-    """C or K in all digits, cells separated by tabs; only its diagonal where the matrix is not finite."""
+    """Return C or K in all digits, cells separated by tabs; only its diagonal where the matrix is not finite."""
     matrix = _rows(analysis, kind)
     rows = [[entry] for entry in _diagonal(analysis, kind)] if matrix is None else matrix.tolist()
     return "\n".join("\t".join(repr(entry) for entry in row) for row in rows)
@@ -195,7 +201,7 @@ class LoadsPanel(Panel):
 
 
 def load_text(analysis: Analysis) -> str:
-    """Deflection and loads of actuators as tables, as `analyze` prints them; without a load, how to set one."""
+    """Return deflection and loads of actuators as tables, as `analyze` prints them; without a load, how to set one."""
     load, display = analysis.load, analysis.machine.display
     if load is None:
         return paragraph("The tool carries no load. Set a force or a moment in the panel Load.")
@@ -213,12 +219,12 @@ def load_text(analysis: Analysis) -> str:
 
 
 def loaded_text(state: LoadedState) -> str:
-    """The state of rest: its verdict, a bar for each leg, displacement, springs (many: their kinds), stiffness now."""
+    """Return the state of rest: its verdict, a bar for each leg, displacement, springs or their kinds, stiffness."""
     display, units = state.machine.display, component_units(state.components)
-    linear = [None] * len(units) if state.linear is None else state.linear.tolist()
-    moved = [
-        [name, display.show_deflection(now, unit), display.show_deflection(first, unit)]
-        for name, unit, now, first in zip(state.components, units, state.displacement, linear, strict=True)
+    first_order = [None] * len(units) if state.linear is None else state.linear.tolist()
+    displacements = [
+        [name, display.show_deflection(exact, unit), display.show_deflection(linear, unit)]
+        for name, unit, exact, linear in zip(state.components, units, state.displacement, first_order, strict=True)
     ]
     springs = as_table(springs_or_kinds_table(state), "")
     return (
@@ -227,7 +233,7 @@ def loaded_text(state: LoadedState) -> str:
         + tension_bars(state)
         + paragraph(stability_of(state))
         + heading("Displacement of the tool point")
-        + table("displacement", ["", "under load", "to first order"], moved, "aligned")
+        + table("displacement", ["", "under load", "to first order"], displacements, "aligned")
         + _tangents(state)
         + heading("Springs")
         + table("springs", springs.heads, springs.rows)
@@ -236,12 +242,13 @@ def loaded_text(state: LoadedState) -> str:
 
 def tension_bars(state: LoadedState) -> str:
     """Return a bar for each leg as long as the load of its actuator: blue where it pulls, orange where it pushes."""
-    shown = named_leg_springs(state)
-    largest = {
-        turning: max((abs(s.load) for _, s in shown if s.turning is turning), default=0.0) for turning in (False, True)
+    named_springs = named_leg_springs(state)
+    largest = {  # forces and moments each have a scale of their own
+        turning: max((abs(spring.load) for _, spring in named_springs if spring.turning is turning), default=0.0)
+        for turning in (False, True)
     }
     rows, legs = [], {}
-    for name, spring in shown:
+    for name, spring in named_springs:
         load = "slack" if spring.slack else state.machine.display.show(spring.load, load_unit(spring.turning))
         rows.append((name, spring.load / (largest[spring.turning] or 1.0), load))
         legs[name] = spring.leg
@@ -259,9 +266,6 @@ def _tangents(state: LoadedState) -> str:
 
 def _load_cells(load: float, motion: float, turning: bool, display: Display) -> list[str]:
     return [display.show(load, load_unit(turning)), display.show_deflection(motion, motion_unit(turning))]
-
-
-NONE = 'The file has no requirements; a table [requirements] with NAME = "free_stiffness_z > 50 N/um" adds one.'
 
 
 class RequirementsPanel(Panel):
@@ -285,7 +289,7 @@ class RequirementsPanel(Panel):
         self.lines.clear()
         with self.lines:
             if isinstance(verdicts, str) or not verdicts:
-                ui.label(verdicts if isinstance(verdicts, str) else NONE)
+                ui.label(verdicts if isinstance(verdicts, str) else NO_REQUIREMENTS)
                 return
             ui.label(headline(verdicts)).mark("requirements-headline")
             for verdict, word, sentence in requirement_lines(verdicts, machine.display):
