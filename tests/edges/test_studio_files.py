@@ -17,9 +17,10 @@ from starlette.responses import PlainTextResponse
 from studio_page import on_page
 
 from kinetostat import export
+from kinetostat.commands.common import LOCAL_HOSTS
 from kinetostat.machine.loading import build, bundled, load
-from kinetostat.studio.menus import about
-from kinetostat.studio.serving import LOOPBACK, BoundedBody
+from kinetostat.studio.menus import first_sentence
+from kinetostat.studio.serving import BoundedBody
 from kinetostat.studio.text_pane import explanation_of, reading
 
 MACHINE = "zhang-gosselin-4dof"
@@ -103,9 +104,9 @@ def test_the_gallery_opens_any_bundled_machine():
 
 
 def test_a_machine_file_is_described_by_its_first_sentence():
-    assert about(bundled()["passive-leg-3dof-pu"]).endswith("on the base axis: three freedoms")
-    assert about(bundled()[MACHINE]).startswith("The machine of D. Zhang and C. M. Gosselin,")
-    assert about('name = "mine"') == ""
+    assert first_sentence(bundled()["passive-leg-3dof-pu"]).endswith("on the base axis: three freedoms")
+    assert first_sentence(bundled()[MACHINE]).startswith("The machine of D. Zhang and C. M. Gosselin,")
+    assert first_sentence('name = "mine"') == ""
 
 
 def test_a_file_of_ones_own_opens_and_saves():
@@ -263,7 +264,7 @@ def test_a_page_that_is_gone_is_not_kept_in_memory():
 @pytest.mark.parametrize(("host", "code"), [("127.0.0.1", 200), ("evil.example", 400)])
 def test_only_this_computer_is_answered(host, code):
     """Against a page of another site whose name is made to point to this computer."""
-    served = TrustedHostMiddleware(PlainTextResponse("page"), allowed_hosts=list(LOOPBACK))
+    served = TrustedHostMiddleware(PlainTextResponse("page"), allowed_hosts=list(LOCAL_HOSTS))
     assert asyncio.run(asked(served, headers={"Host": host})).status_code == code
 
 

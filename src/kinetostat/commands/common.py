@@ -38,6 +38,8 @@ FIGURE_FORMATS = ("png", "svg", "pdf")
 """Formats in which a command writes figures, the usual one first."""
 FILE_SUFFIXES = {".csv", ".html", ".json", ".nc", ".pdf", ".png", ".svg", ".toml"}
 """Suffixes by which `--output` means a file, although a folder may have any name."""
+LOCAL_HOSTS = ("127.0.0.1", "localhost", "::1")
+"""Addresses that only this computer can reach."""
 PROGRESS_SECONDS = 600.0
 """Seconds of progress of which the remaining time is estimated: several chunks, even where each takes minutes."""
 _WORDS = re.compile(r"""(?:-[\w-]+ (?!-))?(?:[^\s"']|"[^"]*"|'[^']*')+""")

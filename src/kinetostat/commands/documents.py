@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from kinetostat.commands.common import (
     DONE,
+    LOCAL_HOSTS,
     MACHINE_HELP,
     NO_ANSWER,
     add_command,
@@ -49,8 +50,6 @@ USUAL_PORT = 8000
 """Port of the page where none is asked for: the usual one of web servers under development."""
 GREATEST_PORT = 65535
 """Ports have 16 bits; 0 would stand for any port that is free, which no browser could know."""
-LOCAL_HOSTS = ("127.0.0.1", "localhost", "::1")
-"""Addresses that only this computer can reach."""
 STUDIO_PACKAGE = "nicegui"
 """Package without which the studio is not installed."""
 NEEDS = """\

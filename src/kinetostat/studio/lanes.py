@@ -33,8 +33,8 @@ class Lane(Generic[Request, Result]):
         self,
         work: Callable[[Request], Result],
         deliver: Callable[[Request, Result], None],
-        failed: Callable[[Exception], None] | None = None,
-        slow: Callable[[], None] = lambda: None,
+        show_failure: Callable[[Exception], None] | None = None,
+        show_waiting: Callable[[], None] = lambda: None,
     ) -> None:
         """Create an idle lane of the page that is being built.
 
@@ -42,14 +42,14 @@ class Lane(Generic[Request, Result]):
             work: computes the result of a request, in a thread, or None if there is nothing to show; it must not touch
                 the page.
             deliver: shows the result, on the event loop.
-            failed: says on the page that `work` has raised an exception; by default the page's exception handler.
-            slow: says on the page that `work` takes longer than people wait without a word.
+            show_failure: says on the page that `work` has raised an exception; by default the page's exception handler.
+            show_waiting: says on the page that `work` takes longer than people wait without a word.
         """
-        self._work, self._deliver, self._slow = work, deliver, slow
+        self._work, self._deliver, self._show_waiting = work, deliver, show_waiting
         self._page = context.client
-        self._failed = failed or self._page.handle_exception
-        self._share = _share(self._page)
-        self._waiting: list[Request] = []
+        self._show_failure = show_failure or self._page.handle_exception
+        self._threads = _threads_of(self._page)
+        self._waiting: list[Request] = []  # one at most
         self.busy = False
         self._open = True
 
@@ -75,17 +75,18 @@ class Lane(Generic[Request, Result]):
             self.busy = False
 
     async def _next(self) -> None:
-        async with self._share:
+        """Compute the latest request, once the page has a thread for it, and deliver the result."""
+        async with self._threads:
             if not self._waiting:
                 return
             request = self._waiting.pop()
             try:
-                working = asyncio.get_running_loop().run_in_executor(_workers(), self._work, request)
-                ended, _ = await asyncio.wait([working], timeout=SECONDS_BEFORE_BUSY)
+                computation = asyncio.get_running_loop().run_in_executor(_executor(), self._work, request)
+                ended, _ = await asyncio.wait([computation], timeout=SECONDS_BEFORE_BUSY)
                 if self._open and not ended:
                     with self._page:
-                        self._slow()
-                result = await working
+                        self._show_waiting()
+                result = await computation
                 if self._open and result is not None:
                     with self._page:
                         self._deliver(request, result)
@@ -93,7 +94,7 @@ class Lane(Generic[Request, Result]):
                 log.exception("the studio could not compute or show something")
                 if self._open:
                     with self._page:
-                        self._failed(error)
+                        self._show_failure(error)
 
 
 def as_sentence(error: Exception) -> str:
@@ -102,15 +103,16 @@ def as_sentence(error: Exception) -> str:
 
 
 @cache
-def _shares() -> "WeakKeyDictionary[Client, asyncio.Semaphore]":
+def _threads_by_page() -> "WeakKeyDictionary[Client, asyncio.Semaphore]":
+    """Return the threads that each page may use; a page that is gone is forgotten."""
     return WeakKeyDictionary()
 
 
-def _share(page: Client) -> asyncio.Semaphore:
-    """Return the semaphore that limits the threads of a page."""
-    return _shares().setdefault(page, asyncio.Semaphore(THREADS_PER_PAGE))
+def _threads_of(page: Client) -> asyncio.Semaphore:
+    """Return the semaphore that all lanes of a page share, so that they use `THREADS_PER_PAGE` together."""
+    return _threads_by_page().setdefault(page, asyncio.Semaphore(THREADS_PER_PAGE))
 
 
 @cache
-def _workers() -> ThreadPoolExecutor:
+def _executor() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(THREADS, "studio")

@@ -8,6 +8,7 @@ import io
 import sys
 import zipfile
 from collections.abc import Callable, Sequence
+from itertools import takewhile
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -27,9 +28,14 @@ REPORTS = (
 SHARED = ("page", "link")
 """Formats for people who have no kinetostat."""
 SHARE_HINT = "Share and export: reports, the machine as a page or a link, and formats of other programs"
+MOST_WRITTEN = 2
+"""Files of all tabs that are written at a time: each takes a core, and the pages need one as well."""
 BUSY = "Another file is being written; wait until it is done."
-WRITING = Turns(2, BUSY)
-"""Files of all tabs that are written at a time."""
+WRITING = Turns(MOST_WRITTEN, BUSY)
+PICTURES = Path(__file__).parent / "gallery_pictures"
+"""Pictures by the names of machines; `benchmarks/gallery_pictures.py` makes them. A machine may be without one."""
+PICTURE_ADDRESS = "/gallery"
+"""Address from which the browser gets the pictures."""
 
 
 class FilesMenu:
@@ -114,26 +120,19 @@ def _archive_of(files: Sequence[tuple[str, bytes]]) -> bytes:
     return stream.getvalue()
 
 
-PICTURES = Path(__file__).parent / "gallery_pictures"
-"""Pictures by the names of machines; `benchmarks/gallery_pictures.py` makes them. A machine may be without one."""
-PICTURE_ADDRESS = "/gallery"
-"""Address from which the browser gets the pictures."""
-
-
 def serve_pictures() -> None:
     """Let browsers load the pictures."""
     app.add_static_files(PICTURE_ADDRESS, PICTURES)
 
 
-def about(text: str) -> str:
+def first_sentence(text: str) -> str:
     """Return the first sentence of the comment at the head of a machine file; empty if there is none."""
-    lines = text.splitlines()
-    head = lines[: next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))]
-    sentence, _, more = " ".join(line.removeprefix("#").strip() for line in head).partition(". ")
+    comment = takewhile(lambda line: line.startswith("#"), text.splitlines())
+    sentence, _, rest = " ".join(line.removeprefix("#").strip() for line in comment).partition(". ")
     # An initial is not the end of a sentence: "The machine of D. Zhang and C. M. Gosselin, ..."
-    while more and sentence[-2:-1] in ("", " "):
-        further, _, more = more.partition(". ")
-        sentence = f"{sentence}. {further}"
+    while rest and sentence[-2:-1] in ("", " "):
+        continuation, _, rest = rest.partition(". ")
+        sentence = f"{sentence}. {continuation}"
     return sentence.rstrip(".")
 
 
@@ -168,9 +167,9 @@ class Gallery:
                         picture = ui.element("img").props(f'src="{PICTURE_ADDRESS}/{name}.webp" alt="" loading="lazy"')
                         picture.props('width="240" height="180"')
                     ui.label(name).classes("gallery-name")
-                    ui.label(about(text)).classes("gallery-about")
-                card.on("click", lambda name=name: self._take(name))
+                    ui.label(first_sentence(text)).classes("gallery-about")
+                card.on("click", lambda name=name: self._open_machine(name))
 
-    def _take(self, name: str) -> None:
+    def _open_machine(self, name: str) -> None:
         self.window.close()
         self._choose(name)

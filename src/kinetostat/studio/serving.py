@@ -21,6 +21,7 @@ from nicegui.server import Server
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from kinetostat.commands.common import LOCAL_HOSTS
 from kinetostat.machine.machine import Machine
 from kinetostat.spec.document import LARGEST_FILE
 from kinetostat.spec.errors import InputError
@@ -59,6 +60,25 @@ SHARE_OF_A_TAB = 0.5
 """Share of the server's time that the messages of one tab may take in the long run: half is left to all others."""
 SECONDS_AT_ONCE = 2.0
 """Seconds that they may take beyond that share, so that a drag of the slider is never slowed down."""
+STYLE = Path(__file__).parent / "style.css"
+SWITCH_SECONDS = 0.0005
+"""Seconds after which a computing thread lets the event loop run: a tenth of Python's default. With many tabs, messages
+would otherwise pile up until browsers take the silence for a lost connection."""
+MEMORY_KEY, ADDRESSES_KEY = "machine", "addresses"
+"""Keys under which the work of a tab, and its latest addresses, are remembered while the server runs."""
+MOST_ADDRESSES = 60
+"""Addresses that are remembered: the browser shows them with a delay, in which there may be as many."""
+SECONDS_TO_CONNECT = 30.0
+"""Seconds within which a page that has been loaded must open its socket: a slow phone does; an idle download would
+keep memory."""
+START_PERIOD = 0.02
+"""Seconds between two looks whether the server listens: nobody sees them in a start of a second."""
+ICON = (
+    '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 32 32"><rect width="32" height="32" rx="7" fill="#0b5ea8"/>'
+    '<path d="M7 25h18M10 25l3-14h6l3 14M11 9h10" stroke="#fff" stroke-width="2.4" fill="none" stroke-linecap="round"/>'
+    "</svg>"
+)
+"""The icon of the page."""
 
 
 class OwnOrigin:
@@ -76,7 +96,7 @@ class OwnOrigin:
         """Pass a request on with protecting headers in its answer, or refuse it."""
         if scope["type"] not in ("http", "websocket"):
             await self._served(scope, receive, send)
-        elif not _foreign(dict(scope["headers"])):
+        elif not _is_foreign(dict(scope["headers"])):
             await self._served(scope, receive, _protecting_send(send))
         elif scope["type"] == "websocket":
             await receive()  # the request to connect
@@ -85,17 +105,19 @@ class OwnOrigin:
             await _refuse(_protecting_send(send), 403)
 
 
-def _foreign(headers: dict[bytes, bytes]) -> bool:
+def _is_foreign(headers: dict[bytes, bytes]) -> bool:
     """Return whether a browser sends this on behalf of another site."""
     origin, host = headers.get(b"origin"), headers.get(b"host", b"").decode("latin-1")
     if origin is not None and urlsplit(origin.decode("latin-1")).netloc != host:
         return True
-    elsewhere = headers.get(b"sec-fetch-site", b"none") not in (b"none", b"same-origin")
-    link = (headers.get(b"sec-fetch-mode"), headers.get(b"sec-fetch-dest")) == (b"navigate", b"document")
-    return elsewhere and not link
+    is_of_other_site = headers.get(b"sec-fetch-site", b"none") not in (b"none", b"same-origin")
+    is_link = (headers.get(b"sec-fetch-mode"), headers.get(b"sec-fetch-dest")) == (b"navigate", b"document")
+    return is_of_other_site and not is_link
 
 
 def _protecting_send(send: Send) -> Send:
+    """Return a `send` that adds the headers of `PROTECTION` to an answer."""
+
     async def sending(message: Message) -> None:
         if message["type"] == "http.response.start":
             protection = [(name.encode(), value.encode()) for name, value in PROTECTION.items()]
@@ -126,15 +148,15 @@ class BoundedBody:
         if announced.isdigit() and int(announced) > self._largest:
             await _refuse(send, 413)
             return
-        seen = 0
+        received_bytes = 0
 
-        async def counted() -> Message:
-            nonlocal seen
+        async def receive_counted() -> Message:
+            nonlocal received_bytes
             message = await receive()
-            seen += len(message.get("body", b""))
-            return message if seen <= self._largest else {"type": "http.disconnect"}
+            received_bytes += len(message.get("body", b""))
+            return message if received_bytes <= self._largest else {"type": "http.disconnect"}
 
-        await self._served(scope, counted, send)
+        await self._served(scope, receive_counted, send)
 
 
 class Pace:
@@ -168,7 +190,7 @@ class Paced:
 
     def __init__(self, served: ASGIApp) -> None:
         self._served = served
-        self._sending: dict[str, Pace] = {}
+        self._paces_of_files: dict[str, Pace] = {}  # by tab, the one that sent a file last at the end
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a connection on; its messages come as fast as its `Pace` allows."""
@@ -182,19 +204,19 @@ class Paced:
             return
         pace = scope[PACE_KEY] = Pace()
 
-        async def paced() -> Message:
+        async def receive_paced() -> Message:
             pace.add(SECONDS_OF_A_MESSAGE)
             await asyncio.sleep(pace.wait)
             return await receive()
 
-        await self._served(scope, paced, send)
+        await self._served(scope, receive_paced, send)
 
     def _pace_of(self, tab: str) -> Pace:
         """Return the pace at which a tab sends files; those that sent nothing for the longest time are forgotten."""
-        pace = self._sending.pop(tab) if tab in self._sending else Pace()
-        self._sending[tab] = pace
-        if len(self._sending) > MOST_TABS:
-            del self._sending[next(iter(self._sending))]
+        pace = self._paces_of_files.pop(tab) if tab in self._paces_of_files else Pace()
+        self._paces_of_files[tab] = pace
+        if len(self._paces_of_files) > MOST_TABS:
+            del self._paces_of_files[next(iter(self._paces_of_files))]
         return pace
 
 
@@ -218,27 +240,6 @@ def timed_handler(handler: Callable[[str, Any], None], scope_of: Callable[[str],
     return handle
 
 
-STYLE = Path(__file__).parent / "style.css"
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
-"""Names under which only this computer can be reached."""
-SWITCH_SECONDS = 0.0005
-"""Seconds after which a computing thread lets the event loop run: a tenth of Python's default. With many tabs, messages
-would otherwise pile up until browsers take the silence for a lost connection."""
-MEMORY_KEY, ADDRESSES_KEY = "machine", "addresses"
-"""Keys under which the work of a tab, and its latest addresses, are remembered while the server runs."""
-MOST_ADDRESSES = 60
-"""Addresses that are remembered: the browser shows them with a delay, in which there may be as many."""
-SECONDS_TO_CONNECT = 30.0
-"""Seconds within which a page that has been loaded must open its socket: a slow phone does; an idle download would
-keep memory."""
-ICON = (
-    '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 32 32"><rect width="32" height="32" rx="7" fill="#0b5ea8"/>'
-    '<path d="M7 25h18M10 25l3-14h6l3 14M11 9h10" stroke="#fff" stroke-width="2.4" fill="none" stroke-linecap="round"/>'
-    "</svg>"
-)
-"""The icon of the page."""
-
-
 def serve(machine: Machine, name: str, host: str, port: int, browser: bool, state: Path) -> None:
     """Serve the studio until it is stopped; every page starts with this machine.
 
@@ -256,7 +257,7 @@ def serve(machine: Machine, name: str, host: str, port: int, browser: bool, stat
     _check_free(host, port)
     sys.setswitchinterval(SWITCH_SECONDS)
     app.on_startup(lambda: background_tasks.create(_announce(host, port)))
-    prepare(machine, name, Workshop(state), LOOPBACK if host in LOOPBACK else ())
+    prepare(machine, name, Workshop(state), LOCAL_HOSTS if host in LOCAL_HOSTS else ())
     # Sockets only: what a tab sends by requests could not be slowed down without the others noticing.
     core.sio.eio.transports = app.config.socket_io_js_transports = ["websocket"]
     ui.run(
@@ -283,7 +284,7 @@ def _check_free(host: str, port: int) -> None:
 async def _announce(host: str, port: int) -> None:
     """Print the address of the studio once it listens."""
     while not Server.instance.started:
-        await asyncio.sleep(0.02)
+        await asyncio.sleep(START_PERIOD)
     shown = f"[{host}]" if ":" in host else host
     print(f"Studio: http://{shown}:{port}   stop with Ctrl-C", file=sys.stderr, flush=True)
 
@@ -330,17 +331,19 @@ async def show(machine: Machine, name: str, workshop: Workshop) -> None:
         return  # loaded by something that is not a browser, or left at once
     remembered = app.storage.tab
     query = client.request.url.query
-    known: deque[str] = remembered.setdefault(ADDRESSES_KEY, deque(maxlen=MOST_ADDRESSES))
+    own_addresses: deque[str] = remembered.setdefault(ADDRESSES_KEY, deque(maxlen=MOST_ADDRESSES))
     memory, problem = remembered.get(MEMORY_KEY), ""
-    if query and query not in known:  # a link; after a reload, the tab's own memory knows what can be undone, too
+    if (
+        query and query not in own_addresses
+    ):  # a link; after a reload, the tab's own memory knows what can be undone, too
         try:
             memory = await run.io_bound(memory_of, parse_qsl(query, keep_blank_values=True))
         except InputError as error:
             problem = str(error)
 
-    def remember(changed: Memory, address: str) -> None:
-        remembered[MEMORY_KEY] = changed
-        known.append(address)
+    def remember(memory: Memory, address: str) -> None:
+        remembered[MEMORY_KEY] = memory
+        own_addresses.append(address)
 
     StudioPage(memory or Memory(machine, name), remember, workshop)
     if problem:

@@ -18,8 +18,16 @@ from kinetostat.views.page import breakable
 
 FIELD_DIGITS = 6
 """Significant digits of a value in a field that may be typed over: what was written in a file comes back as it was."""
+FIRST_CHARACTERS_OF_NUMBERS = tuple("+-.0123456789")
+"""Characters with which a number begins, and no word such as "rigid"."""
 LEAST_FULL_BAR = 1e-3
 """Least logarithm of a gain that fills a whole bar, so that bars stay short if all gains are tiny."""
+LONGEST_ARITHMETIC = 64
+"""Characters that are read as arithmetic: longer texts are no number that anybody types."""
+_TOKEN = re.compile(
+    rf"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<unit>{UNIT.pattern})|(?P<sign>[-+*/()]))"
+)
+"""A number, a unit or a sign of arithmetic, with blanks before it; the name of the group says which."""
 
 
 def shown_value(quantity: Quantity, value: float, display: Display = ENGINEERING) -> str:
@@ -32,7 +40,7 @@ def shown_value(quantity: Quantity, value: float, display: Display = ENGINEERING
 def unit_shown(quantity: Quantity, value: float, display: Display = ENGINEERING) -> str:
     """Return the unit that a field shows beside a value; empty for "rigid", "no limit" and numbers without a unit."""
     text = shown_value(quantity, value, display)
-    return text.partition(" ")[2] if text[-1:] and text[0] in "+-.0123456789" else ""
+    return text.partition(" ")[2] if text.startswith(FIRST_CHARACTERS_OF_NUMBERS) else ""
 
 
 def engineering(value: float | None, unit: str = "1", display: Display = ENGINEERING) -> str:
@@ -88,14 +96,14 @@ def table(
     """
     columns = [without_round_off(column) for column in zip(*rows, strict=True)]
     columns[1:] = [[*map(with_minus_signs, column)] for column in columns[1:]]
-    kinds = ["" if number else ' class="words"' for number in numeric or [True] * len(head)]
-    top = "".join(f'<th scope="col"{name}>{escape(cell)}</th>' for cell, name in zip(head, kinds, strict=True))
+    classes = ["" if is_numeric else ' class="words"' for is_numeric in numeric or [True] * len(head)]
+    heads = "".join(f'<th scope="col"{name}>{escape(cell)}</th>' for cell, name in zip(head, classes, strict=True))
     body = "".join(
-        f'<tr><th scope="row">{escape(first)}</th>{_cells(rest, kinds[1:])}</tr>'
+        f'<tr><th scope="row">{escape(first)}</th>{_cells(rest, classes[1:])}</tr>'
         for first, *rest in zip(*columns, strict=True)
     )
-    heads = f"<thead><tr>{top}</tr></thead>" if any(head) else ""
-    return f'<table class="figures {kind}"><caption>{escape(caption)}</caption>{heads}<tbody>{body}</tbody></table>'
+    top = f"<thead><tr>{heads}</tr></thead>" if any(head) else ""
+    return f'<table class="figures {kind}"><caption>{escape(caption)}</caption>{top}<tbody>{body}</tbody></table>'
 
 
 def titled_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], kind: str = "") -> str:
@@ -103,8 +111,8 @@ def titled_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]],
     return heading(title) + table(title, head, rows, kind)
 
 
-def _cells(cells: Sequence[str], kinds: Sequence[str]) -> str:
-    return "".join(f"<td{name}>{escape(cell)}</td>" for cell, name in zip(cells, kinds, strict=True))
+def _cells(cells: Sequence[str], classes: Sequence[str]) -> str:
+    return "".join(f"<td{name}>{escape(cell)}</td>" for cell, name in zip(cells, classes, strict=True))
 
 
 def bars(caption: str, rows: Sequence[tuple[str, float, str]], legs: Mapping[str, str] | None = None) -> str:
@@ -145,13 +153,6 @@ def paragraph(text: str, kind: str = "note") -> str:
     return f'<p class="{kind}">{escape(with_minus_signs(text))}</p>'
 
 
-LONGEST_ARITHMETIC = 64
-"""Characters that are read as arithmetic: longer texts are no number that anybody types."""
-_TOKEN = re.compile(
-    rf"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<unit>{UNIT.pattern})|(?P<sign>[-+*/()]))"
-)
-
-
 @dataclass(frozen=True)
 class _Term:
     """A number and its unit, which is empty as long as there is none."""
@@ -185,7 +186,7 @@ def typed_value(text: str, kind: str, shown_unit: str) -> float:
 
 
 def _tokens(text: str) -> list[tuple[str, str]]:
-    """Part a text into numbers, units and signs; the last entry is empty."""
+    """Part a text into pairs of a kind ("number", "unit" or "sign") and its text; an empty pair marks the end."""
     tokens, place, text = [], 0, text.strip()
     if len(text) > LONGEST_ARITHMETIC:
         raise _UnreadableError
@@ -199,7 +200,10 @@ def _tokens(text: str) -> list[tuple[str, str]]:
 
 
 class _Reader:
-    """Reads a sum of products of factors from left to right; a factor is a number, or a sum in parentheses."""
+    """Reads a sum of products of factors from left to right; a factor is a number, or a sum in parentheses.
+
+    There is a method for each of the three; each goes on from the place where the last one has stopped.
+    """
 
     def __init__(self, text: str, kind: str, shown_unit: str) -> None:
         self._tokens, self._place = _tokens(text), 0
@@ -217,10 +221,10 @@ class _Reader:
             raise UnitError(f'it has no unit, and the field shows none; write for example "{self._kind.example}"')
         return parse(f"{number!r} {unit}", self._kind.name, self._shown_unit)
 
-    def _take(self, kind: str, texts: str = "") -> str:
-        """Return the next token and go on behind it if it is of this kind and one of these texts; else return ""."""
-        known, text = self._tokens[self._place]
-        if known != kind or (texts and text not in texts):
+    def _take(self, kind: str, signs: str = "") -> str:
+        """Return the next token and go on behind it if it is of this kind, and one of these signs; else return ""."""
+        token_kind, text = self._tokens[self._place]
+        if token_kind != kind or (signs and text not in [*signs]):
             return ""
         self._place += 1
         return text
@@ -236,7 +240,7 @@ class _Reader:
             return _Term(sum(term.number for term in terms))
         totals: dict[str, float] = {}
         unit = self._shown_unit
-        for term in reversed(terms):
+        for term in reversed(terms):  # a number without a unit has the next one to its right
             unit = term.unit or unit
             totals[unit] = totals.get(unit, 0.0) + term.number
         if len(totals) == 1:
