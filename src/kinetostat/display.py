@@ -20,6 +20,7 @@ twelve lies round-off."""
 DASH = "–"
 """Stands where there is no number."""
 INFINITE = "∞"
+"""Stands for infinity."""
 _VALUE = re.compile(r"([-+]?[\d.]+(?:e-?\d+)?) (\S+)")
 _HYPHEN_OF_NUMBER = re.compile(r"(?<![\w.,)-])-(?=[\d.∞])")
 MOST_DECIMALS = 6
@@ -52,7 +53,9 @@ SMALL_MOTIONS = {"m": 1e3, "rad": 1e3}
 DUAL = {"N/m": "m/N", "N·m/rad": "rad/(N·m)", "N/rad": "rad/N"}
 """Stiffnesses and the compliances whose units follow from theirs."""
 POWERS = {"2": "²", "3": "³", "4": "⁴"}
+"""Powers of units, as they are printed."""
 EXAMPLE = "mm, deg, N/um, N*m/urad"
+"""Units that may be chosen, for messages and help."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +94,7 @@ class Display:
     def deflection(self, unit: str) -> Scale:
         """Return the scale of a small motion in m or rad: that of the compliances, µm and µrad unless chosen."""
         compliance = {"m": "m/N", "rad": "rad/(N·m)"}[unit]
-        return _small(self.scale(compliance).unit.partition("/")[0])
+        return _scale_of_motion(self.scale(compliance).unit.partition("/")[0])
 
     def fitting(self, unit: str, values: Iterable[float]) -> Scale:
         """Return the scale for values of one quantity: lengths and angles that are all small are small motions.
@@ -255,7 +258,8 @@ def _scales(units: str) -> dict[str, Scale]:
 
 
 @cache
-def _small(unit: str) -> Scale:
+def _scale_of_motion(unit: str) -> Scale:
+    """Return the scale of motions that are read in a unit of length or angle."""
     return Scale(1.0 / multiple_of_unit(unit, ["m", "rad"], EXAMPLE)[1], unit)
 
 

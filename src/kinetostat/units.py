@@ -150,6 +150,9 @@ IN_FILES = {
 PLAIN = (1e-4, 1e6)
 """Between these a number is written without an exponent: at most six digits or three zeros stand before the rest."""
 
+MOST_DIGITS = 17
+"""Significant digits after which no other float is written in the same way."""
+
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 _NAME = r"(?:[A-Za-zµμ°]+|%)(?:\s*(?:\*\*|\^)\s*[1-4]|[²³⁴])?"
 _UNDER = rf"/\s*\({_NAME}(?:\s*[*·]\s*{_NAME})*\)"
@@ -227,7 +230,7 @@ def _exactly(value: float, unit: str, wanted: Kind) -> str | None:
         factor = _factor(unit, wanted) if unit else 1.0
     except UnitError:
         return None
-    for digits in range(1, 18):
+    for digits in range(1, MOST_DIGITS + 1):
         number = f"{value / factor + 0.0:.{digits}g}"
         if float(number) * factor == value:
             mantissa, _, exponent = number.partition("e")

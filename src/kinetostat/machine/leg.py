@@ -9,7 +9,8 @@ Source: theory (1) and (2), eqs. 1-4. In the base frame.
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Protocol
+from itertools import pairwise
+from typing import NamedTuple, Protocol
 
 from kinetostat.algebra.scalar import Scalar, cos, is_zero, reciprocal, sin
 from kinetostat.algebra.screw import Twist, Wrench, force_along, rotation_about, translation_along
@@ -37,8 +38,11 @@ class PartName(str):
         return self.leg, self.kind
 
 
-Station = tuple[int, Vector]
-"""A point of a leg, base frame, m, and how many elements of its chain, from the base, carry it."""
+class Station(NamedTuple):
+    """A point of a leg, base frame, m, and how many elements of its chain, from the base, carry it."""
+
+    elements: int
+    point: Vector
 
 
 @dataclass(frozen=True)
@@ -320,13 +324,17 @@ class Leg:
     @property
     def path(self) -> tuple[Vector, ...]:
         """Its joint centres and link ends from base to platform, base frame, m: what a drawing connects."""
-        return tuple(point for _, point in self.stations)
+        return tuple(station.point for station in self.stations)
 
     @property
     def stations(self) -> tuple[Station, ...]:
         """The points of its path, and how many elements of the chain carry each."""
-        every = [(i + k, p) for i, element in enumerate(self.chain) for k, p in enumerate(element.path)]
-        return tuple(each for n, each in enumerate(every) if n == 0 or not each[1].is_at(every[n - 1][1]))
+        stations: list[Station] = []
+        for number, element in enumerate(self.chain):
+            # What comes before an element carries its first point, and the element itself the next one.
+            stations += [Station(number + place, point) for place, point in enumerate(element.path)]
+        pairs = pairwise(stations)
+        return (*stations[:1], *(station for before, station in pairs if not station.point.is_at(before.point)))
 
     def displaced(self, motion: Displacement) -> "Leg":
         """The leg after a rigid displacement of the whole machine."""
@@ -342,28 +350,41 @@ class Leg:
             absent: freedoms that a planar machine does not have: the leg carries nothing against them.
         """
         passive = tuple(joint.twist(reference) for joint in (*self.passive, *absent))
-        lines, centres = self.lines, None if absent else self._two_centres()
-        squares: tuple[Scalar, ...] = ()
-        singularity_margin: Scalar = 1.0  # of a leg that is known to carry forces along lines alone
-        if centres:
-            squares = (centres.square(reference, length),)
-            lines = (Line(centres.point, self._slide_along(centres.along)),)
-            singularity_margin = centres.singularity_margin(reference, length)
-        wrenches = tuple(line.wrench(reference) for line in lines)
-        if not lines:
-            needed = [twist for i, twist in enumerate(passive) if i not in self.idle]
-            wrenches, singularity_margin = reciprocal_wrenches(needed, length)
+        carried = self._carried_wrenches(passive, reference, length, None if absent else self._two_centres())
         elastic = tuple(spring.joint.twist(reference) for spring in self.springs)
+        loads = (_loads(s, t, carried.wrenches, carried.lines) for s, t in zip(self.springs, elastic, strict=True))
         return LegScrews(
             passive=passive,
             elastic=elastic,
             compliance=tuple(reciprocal(spring.stiffness) for spring in self.springs),
-            wrenches=wrenches,
-            loads=tuple(_loads(s, t, wrenches, lines) for s, t in zip(self.springs, elastic, strict=True)),
+            wrenches=carried.wrenches,
+            loads=tuple(loads),
             load_squares=self._load_squares(elastic, length),
-            singularity_margin=singularity_margin,
-            wrench_squares=squares,
+            singularity_margin=carried.singularity_margin,
+            wrench_squares=carried.squares,
         )
+
+    def _carried_wrenches(
+        self, passive: Sequence[Twist], reference: Vector, length: Scalar, centres: TwoCentres | None
+    ) -> "_CarriedWrenches":
+        """The wrenches that the leg carries, by the least arithmetic that its form allows.
+
+        Args:
+            passive: unit twists of the passive joints, and of the freedoms that a planar machine does not have.
+            reference: base frame, m.
+            length: m, see `screws`.
+            centres: the points about which all passive axes turn, if these are two.
+        """
+        if centres:
+            squares = (centres.square(reference, length),)
+            line = Line(centres.point, self._slide_along(centres.along))
+            margin = centres.singularity_margin(reference, length)
+            return _CarriedWrenches((line.wrench(reference),), (line,), margin, squares)
+        if self.lines:  # such a leg cannot lock up
+            return _CarriedWrenches(tuple(line.wrench(reference) for line in self.lines), self.lines, 1.0)
+        needed = [twist for i, twist in enumerate(passive) if i not in self.idle]
+        wrenches, margin = reciprocal_wrenches(needed, length)
+        return _CarriedWrenches(wrenches, (), margin)
 
     def _load_squares(self, elastic: Sequence[Twist], length: Scalar) -> tuple[Scalar, ...]:
         """Square of the greatest load that a unit wrench can exert on each spring, beside which others are round-off.
@@ -387,6 +408,18 @@ class Leg:
         if not all(rows) or sum(map(len, rows)) != len(passive) - len(self.idle):
             return None
         return two_centres([row[0].pivot for row in rows], [[joint.axis for joint in row] for row in rows])
+
+
+class _CarriedWrenches(NamedTuple):
+    """The wrenches that a leg carries, with the lines that they act along, if these are known.
+
+    The margin and the squares are those of `LegScrews`.
+    """
+
+    wrenches: tuple[Wrench, ...]
+    lines: tuple[Line, ...]
+    singularity_margin: Scalar
+    squares: tuple[Scalar, ...] = ()
 
 
 def _loads(spring: Spring, twist: Twist, wrenches: Sequence[Wrench], lines: Sequence[Line]) -> tuple[Scalar, ...]:

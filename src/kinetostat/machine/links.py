@@ -226,7 +226,7 @@ def _stations(leg: Leg) -> tuple[Station, ...]:
     """The stations of a leg's path, which begins at the first joint also where that is driven."""
     first = leg.chain[0]
     foot = first.joint.point if isinstance(first, Spring) else None
-    return leg.stations if foot is None or foot.is_at(leg.stations[0][1]) else ((0, foot), *leg.stations)
+    return leg.stations if foot is None or foot.is_at(leg.stations[0][1]) else (Station(0, foot), *leg.stations)
 
 
 def _ends_of_leg(leg: Leg) -> tuple[Station, ...]:
@@ -243,7 +243,7 @@ def _ends_of_bar(leg: Leg, piece: int, bar: int) -> tuple[Station, ...]:
     """Both ends of a bar, by its number from 0, of a piece that is a parallelogram."""
     pair = next(element for element in leg.chain if isinstance(element, Parallelogram))
     carried = zip(_ends_of_piece(leg, piece), pair.bars[bar], strict=True)
-    return tuple((elements, point) for (elements, _), point in carried)
+    return tuple(Station(station.elements, point) for station, point in carried)
 
 
 def in_each_leg(link: str, field: str, piece: int) -> LinksOf:
@@ -301,7 +301,7 @@ def from_origin(name: str) -> LinksOf:
 
     def placed_links(legs: Sequence[Leg], tip: Vector, _geometry: Any) -> list[PlacedLink]:
         elements = next((len(leg.chain) for leg in legs if leg.name == name), 0)
-        return [PlacedLink(name, name, tip.norm(), lambda: ((0, ZERO), (elements, tip)))]
+        return [PlacedLink(name, name, tip.norm(), lambda: (Station(0, ZERO), Station(elements, tip)))]
 
     return placed_links
 

@@ -87,8 +87,8 @@ def angles_of(form: str, value: object, where: str) -> dict[str, Array]:
     Raises:
         InputError: it is not of this form, not of unit length, not orthogonal, or a mirror image.
     """
-    readers = {"quaternion": _of_quaternions, "rotation": _of_matrices, "tilt": _of_tilts}
-    return _angles(readers[form](value, where))
+    readers = {"quaternion": _rotations_of_quaternions, "rotation": _rotations_of_matrices, "tilt": _rotations_of_tilts}
+    return _roll_pitch_yaw(readers[form](value, where))
 
 
 def _numbers(value: object, shape: tuple[int, ...], form: str, where: str) -> Array:
@@ -104,11 +104,11 @@ def _numbers(value: object, shape: tuple[int, ...], form: str, where: str) -> Ar
     return array
 
 
-def _of_quaternions(value: object, where: str) -> Array:
+def _rotations_of_quaternions(value: object, where: str) -> Array:
     quaternions = _numbers(value, (4,), "quaternion", where)
     with np.errstate(over="ignore"):
         length = np.sqrt((quaternions**2).sum(axis=1))
-    _refuse(np.abs(length - 1.0), lambda i: f"{where} has length {length[i]:.6g}; write {FORMS['quaternion']}.")
+    _refuse_large(np.abs(length - 1.0), lambda i: f"{where} has length {length[i]:.6g}; write {FORMS['quaternion']}.")
     w, x, y, z = (quaternions / length[:, None]).T
     return _rows(
         (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
@@ -117,18 +117,18 @@ def _of_quaternions(value: object, where: str) -> Array:
     )
 
 
-def _of_matrices(value: object, where: str) -> Array:
+def _rotations_of_matrices(value: object, where: str) -> Array:
     turns = _numbers(value, (3, 3), "rotation", where)
     with np.errstate(all="ignore"):
         errors = np.abs(np.swapaxes(turns, 1, 2) @ turns - np.eye(3)).max(axis=(1, 2))
-    _refuse(
+    _refuse_large(
         errors,
         lambda i: (
             f"{where} is not a rotation: lengths and products of its columns differ from those of perpendicular unit "
             f"vectors by up to {errors[i]:.2g}; write {FORMS['rotation']}."
         ),
     )
-    _refuse(
+    _refuse_large(
         np.where(np.linalg.det(turns) < 0.0, 1.0, 0.0),
         lambda _: (
             f"{where} is a mirror image and not a rotation: its determinant is -1; turn one of its columns round."
@@ -140,7 +140,7 @@ def _of_matrices(value: object, where: str) -> Array:
     return turns
 
 
-def _of_tilts(value: object, where: str) -> Array:
+def _rotations_of_tilts(value: object, where: str) -> Array:
     if not isinstance(value, Mapping) or not set(TILT[:2]) <= value.keys() <= set(TILT):
         raise InputError(f"{where} is {shorten(value)}; give {FORMS['tilt']} (torsion may be left out: 0).")
     parts = {"torsion": 0.0, **value}
@@ -168,7 +168,7 @@ def _angle_values(value: Any, where: str) -> Array:
         raise InputError(f"{where} is {shorten(value)}: {error}.") from None
 
 
-def _refuse(errors: Array, sentence: Callable[[int], str]) -> None:
+def _refuse_large(errors: Array, sentence: Callable[[int], str]) -> None:
     """Refuse the first orientation whose error is larger than rounded digits explain.
 
     Args:
@@ -198,7 +198,7 @@ def _about_y(angle: Array) -> Array:
     return _rows((c, none, s), (none, none + 1.0, none), (-s, none, c))
 
 
-def _angles(turns: Array) -> dict[str, Array]:
+def _roll_pitch_yaw(turns: Array) -> dict[str, Array]:
     """Roll, pitch and yaw of rotations [n x 3 x 3]; roll is 0 at pitch = +-90 deg, where only one angle is left."""
     flat = np.hypot(turns[:, 0, 0], turns[:, 1, 0])
     upright = flat < NO_ANGLE_RATES

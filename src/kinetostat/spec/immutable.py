@@ -76,6 +76,7 @@ class FixedArray(np.ndarray):
     """
 
     def __array_finalize__(self, source: Any) -> None:
+        # NumPy calls this for every new array of this class. A view has a base and stays fixed; a copy has none.
         self.fixed = self.base is not None and getattr(source, "fixed", True)
 
     def __array_wrap__(self, array: AnyArray, _context: Any = None, return_scalar: bool = False) -> Any:

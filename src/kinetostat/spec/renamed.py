@@ -7,14 +7,16 @@ import sys
 import warnings
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
-T = TypeVar("T")
+AnyClass = TypeVar("AnyClass")
+WordKind = Literal["quantity", "JSON key", "attribute"]
+"""Kinds of public words: names of quantities, keys of JSON data, attributes of classes in Python."""
 
 PACKAGE = __name__.partition(".")[0]
 """The name with which all modules of kinetostat begin."""
 
-RENAMED: Mapping[str, Mapping[str, str]] = MappingProxyType(
+RENAMED: Mapping[WordKind, Mapping[str, str]] = MappingProxyType(
     {
         "quantity": {"regularity": "singularity_margin", "side": "aspect"},
         "JSON key": {
@@ -37,12 +39,12 @@ DEPRECATED_KEYS = "deprecated_keys"
 """The key of JSON data under which the old keys are listed, each with the key that replaces it."""
 
 
-def current_name(name: str, kind: str) -> str:
+def current_name(name: str, kind: WordKind) -> str:
     """Return the present word for one that may be from an earlier version, and warn if it is.
 
     Args:
         name: a word as the user wrote it.
-        kind: a key of `RENAMED`; words that it does not list are returned as they are.
+        kind: its kind; words that `RENAMED` does not list are returned as they are.
     """
     current = RENAMED[kind].get(name)
     if current is None:
@@ -69,14 +71,14 @@ def renamed_property(current: str) -> Any:
     return Former()
 
 
-def former_names(**current: str) -> Callable[[type[T]], type[T]]:
+def former_names(**current: str) -> Callable[[type[AnyClass]], type[AnyClass]]:
     """Keep old names of a class's attributes alive as `renamed_property` does; a class decorator.
 
     Args:
         current: the present name for each old one.
     """
 
-    def add(cls: type[T]) -> type[T]:
+    def add(cls: type[AnyClass]) -> type[AnyClass]:
         for former, name in current.items():
             alias = renamed_property(name)
             alias.__set_name__(cls, former)
@@ -102,6 +104,7 @@ def with_former_keys(data: dict[str, Any], table: Mapping[str, str]) -> dict[str
 
 
 def _with_old(value: Any, former: Mapping[str, str], used: dict[str, str]) -> Any:
+    """Return data with old keys beside the present ones; each key that is added is noted in `used`, old to present."""
     if isinstance(value, list | tuple):
         return [_with_old(entry, former, used) for entry in value]
     if not isinstance(value, dict):

@@ -5,6 +5,7 @@ Which quantities and fields exist depends on the machine and is checked where th
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -14,6 +15,7 @@ from kinetostat.spec.document import Document, override, read_text, toml_key, to
 from kinetostat.spec.errors import InputError, shorten
 
 TABLE = "requirements"
+"""Name of the table in files."""
 MOST_POSES = 10_000
 """Poses of a requirement: each is solved for whenever the requirement is judged."""
 MOST_CONDITIONS = 50
@@ -99,28 +101,31 @@ def read_requirements(written: object, origin: str) -> Requirements:
         table = {"demand": entry} if isinstance(entry, str | list) else entry
         wrong = _wrong_part(name, table)
         if wrong is not None:
-            place = ".".join([TABLE, str(name), *wrong])
+            place = f"{TABLE}.{name}.{wrong}" if wrong else f"{TABLE}.{name}"
             raise InputError(f'"{origin}": {place} is wrong in {shorten(entry)}; {REQUIREMENT_FORM}.')
         requirements[name] = _requirement_of(**table)
     return requirements
 
 
-def _wrong_part(name: object, table: Any) -> list[str] | None:
-    """Return the key of the first part of a requirement that is not as it must be; no key where the whole is not."""
+def _wrong_part(name: object, table: Any) -> str | None:
+    """Return the key of the first part of a requirement that is not as it must be; None if all of it is right.
+
+    The key is empty where the whole is wrong.
+    """
     if not (isinstance(name, str) and 0 < len(name) <= LONGEST_REQUIREMENT_NAME and isinstance(table, dict)):
-        return []
+        return ""
     if "fits" in table:
-        wrong = [str(key) for key, value in table.items() if key not in DRIVEN or not isinstance(value, str)]
-        return wrong[:1] or next(([key] for key in ("fits", "motion") if not table.get(key)), None)
+        wrong = (str(key) for key, value in table.items() if key not in DRIVEN or not isinstance(value, str))
+        missing = (key for key in ("fits", "motion") if not table.get(key))
+        return next(chain(wrong, missing), None)
     demand, over, poses = table.get("demand"), table.get("over", []), table.get("poses", [])
     if not (isinstance(demand, str) or (_are_texts(demand, MOST_CONDITIONS) and demand)):
-        return ["demand"]
+        return "demand"
     if not _are_texts(over, MOST_RANGES):
-        return ["over"]
+        return "over"
     if not (isinstance(poses, list | tuple) and len(poses) <= MOST_POSES and all(map(_is_pose, poses))):
-        return ["poses"]
-    unknown = [str(key) for key in table if key not in ("demand", "over", "poses")]
-    return unknown[:1] or None
+        return "poses"
+    return next((str(key) for key in table if key not in ("demand", "over", "poses")), None)
 
 
 def _requirement_of(

@@ -319,11 +319,11 @@ def _member(
 
 def _stations(carrier: Carrier, ends: tuple[Vector, Vector]) -> tuple[Station, ...]:
     start, end = (carrier.motion.apply(point) for point in ends)
-    return (carrier.elements_to_start, start), (carrier.elements_to_end, end)
+    return Station(carrier.elements_to_start, start), Station(carrier.elements_to_end, end)
 
 
 def _station(carrier: Carrier, point: Vector) -> Station:
-    return carrier.elements_to_start, carrier.motion.apply(point)
+    return Station(carrier.elements_to_start, carrier.motion.apply(point))
 
 
 def _section(leg: LegPlan, body: str) -> str:

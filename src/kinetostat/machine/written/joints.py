@@ -251,8 +251,10 @@ LOAD_OF_STIFFNESS = {"linear stiffness": "force", "torsional stiffness": "moment
 
 def stiffness_kind(kind: str, motor: str) -> str:
     """Kind of quantity of the stiffness of a joint's actuator or hinge; `motor` says which freedom it is on, if any."""
-    row = JOINT_TYPES[kind]
-    return row.motors[motor].stiffness if motor else row.stiffness or "torsional stiffness"
+    joint_type = JOINT_TYPES[kind]
+    if motor:
+        return joint_type.motors[motor].stiffness
+    return joint_type.stiffness or "torsional stiffness"  # of a type without one it is not used
 
 
 ONE_FREEDOM = tuple(name for name, kind in JOINT_TYPES.items() if kind.stiffness)
