@@ -166,16 +166,12 @@ def elevation(
         InputError: no gravity or nothing that weighs, a bad range or axis, or what `correction_table` and `budget`
             refuse.
     """
-    as_given = state_of(machine).machine
-    _check_gravity(as_given)
-    axis_of_gravity = {"load.gravity_axis": list(about)} if len(about) else {}
-    upright = replace(changed(as_given, {**axis_of_gravity, GRAVITY_ANGLE: 0.0}), loaded=True)
+    upright = _upright_machine(state_of(machine).machine, about)
     elevations = _elevations(over)
     count, angles = len(elevations), UPRIGHT - elevations
     span = f"{GRAVITY_ANGLE}={float(angles[0])!r}:{float(angles[-1])!r}:{count}"
     steps = ANSWERS_BEFORE_REQUIREMENTS + (count if upright.requirements else 0)
-    states = states_at(upright, {GRAVITY_ANGLE: angles}, count)
-    numbers, statuses = loaded_numbers(states)
+    rest = _rest_at(upright, angles)
     progress(1, steps)
     frequency = evaluate(upright, PointTable({GRAVITY_ANGLE: angles}), [FREQUENCY]).values[FREQUENCY]
     progress(2, steps)
@@ -183,30 +179,66 @@ def elevation(
     progress(3, steps)
     error_budget = budget(upright, ranges=[span]) if upright.tolerances else None
     progress(ANSWERS_BEFORE_REQUIREMENTS, steps)
-    driven = states.mechanism.driven
-    loads = np.asarray(numbers.get("drive_loads", np.full((count, len(driven)), np.nan)))
-    at_rest = np.isfinite(loads).all(axis=1)  # states without rest have no loads
 
     def requirements_done(judged: int) -> None:
         progress(ANSWERS_BEFORE_REQUIREMENTS + judged, steps)
 
     return Elevation(
         state=state_of(upright),
-        status=_overall_status(statuses),
-        message=_message(statuses, elevations, upright),
+        status=_overall_status(rest.statuses),
+        message=_message(rest.statuses, elevations, upright),
         elevations=elevations,
-        statuses=statuses,
+        statuses=rest.statuses,
         components=upright.family.component_names,
-        displacement=np.where(at_rest[:, None], _displacement(upright, numbers["displacement"]), np.nan),
-        frequency=np.where(at_rest, frequency, np.nan),
-        actuators=tuple(states.mechanism.actuators),
-        turning=tuple(spring.joint.point is not None for spring in driven),
-        loads=loads,
-        limit_use=_limit_use(states, loads),
+        displacement=rest.displacement,
+        frequency=np.where(np.isfinite(rest.loads).all(axis=1), frequency, np.nan),
+        actuators=rest.actuators,
+        turning=rest.turning,
+        loads=rest.loads,
+        limit_use=rest.limit_use,
         reversals=_reversals(error_model(upright, {GRAVITY_ANGLE: angles}, count), angles, upright),
         budget=error_budget,
         corrections=corrections,
         requirements=_requirements(upright, angles, elevations, requirements_done),
+    )
+
+
+def _upright_machine(machine: Machine, about: Sequence[float]) -> Machine:
+    """The machine meant loaded, as it stands at an elevation of 90 degrees, with the axis about which gravity turns."""
+    if not any(machine.tables["load"].gravity):
+        raise InputError(
+            f'{machine.name} has no gravity that could turn; write gravity = [0, 0, "-9.81 m/s**2"] under [load], '
+            "as it acts at an elevation of 90 deg."
+        )
+    axis = {"load.gravity_axis": list(about)} if len(about) else {}
+    return replace(changed(machine, {**axis, GRAVITY_ANGLE: 0.0}), loaded=True)
+
+
+class _Rest(NamedTuple):
+    """States at rest over the elevation, as the fields of `Elevation`; NaN where there is none."""
+
+    statuses: Integers
+    displacement: Array
+    actuators: tuple[str, ...]
+    turning: tuple[bool, ...]
+    loads: Array
+    limit_use: Array
+
+
+def _rest_at(upright: Machine, angles: Array) -> _Rest:
+    """The states at rest at some angles of gravity, rad [n]."""
+    states = states_at(upright, {GRAVITY_ANGLE: angles}, len(angles))
+    numbers, statuses = loaded_numbers(states)
+    driven = states.mechanism.driven
+    loads = np.asarray(numbers.get("drive_loads", np.full((len(angles), len(driven)), np.nan)))
+    has_rest = np.isfinite(loads).all(axis=1)
+    return _Rest(
+        statuses=statuses,
+        displacement=np.where(has_rest[:, None], _displacement(upright, numbers["displacement"]), np.nan),
+        actuators=tuple(states.mechanism.actuators),
+        turning=tuple(spring.joint.point is not None for spring in driven),
+        loads=loads,
+        limit_use=_limit_use(states, loads),
     )
 
 
@@ -219,15 +251,6 @@ def _displacement(machine: Machine, twists: Array) -> Array:
         round_off = sizes < ROUND_OFF_OF_ENTRY * np.nanmax(sizes, initial=0.0)
         components[:, columns] = np.where(round_off, 0.0, components[:, columns])
     return components
-
-
-def _check_gravity(machine: Machine) -> None:
-    load = machine.tables["load"]
-    if not any(load.gravity):
-        raise InputError(
-            f'{machine.name} has no gravity that could turn; write gravity = [0, 0, "-9.81 m/s**2"] under [load], '
-            "as it acts at an elevation of 90 deg."
-        )
 
 
 def _elevations(over: str) -> Array:

@@ -189,15 +189,16 @@ def guidelines(machine: Machine | MachineState, ranges: Sequence[str] = (), prog
     state, ranges = state_of(machine), as_list(ranges)
     machine = state.machine
     grid = _grid(machine, ranges) if ranges else None
-    sensitivities, names = sensitivity(state), machine.family.component_names
+    sensitivities = sensitivity(state)
+    unanswered = Guidelines(
+        state=state,
+        status=sensitivities.status,
+        message=sensitivities.message,
+        components=machine.family.component_names,
+        loads_left_out=sensitivities.loads_left_out,
+    )
     if sensitivities.status is not Status.OK:
-        return Guidelines(
-            state=state,
-            status=sensitivities.status,
-            message=sensitivities.message,
-            components=names,
-            loads_left_out=sensitivities.loads_left_out,
-        )
+        return unanswered
     components, response = list(machine.family.components), state.free
     single_elements = elements(response.configuration)
     all_elements = with_links_together(single_elements)
@@ -208,14 +209,9 @@ def guidelines(machine: Machine | MachineState, ranges: Sequence[str] = (), prog
         roles_over_grid, poses = roles_over(machine, grid, all_elements, components, progress)
         effects = with_signs_over_grid(state, grid, effects)
     by_path = parameters_by_path(machine)
-    without_derivative = [
-        (path, reason) for path, reason in sensitivities.without_derivative if is_of_design(by_path[path])
-    ]
-    return Guidelines(
-        state=state,
-        status=sensitivities.status,
-        message=sensitivities.message,
-        components=names,
+    without_derivative = [pair for pair in sensitivities.without_derivative if is_of_design(by_path[pair[0]])]
+    return replace(
+        unanswered,
         compliance_diagonal=diagonal,
         elements=tuple(all_elements),
         roles=roles_at(response, all_elements, components),
@@ -227,7 +223,6 @@ def guidelines(machine: Machine | MachineState, ranges: Sequence[str] = (), prog
         ranges=tuple(ranges),
         poses=poses,
         roles_over_grid=roles_over_grid,
-        loads_left_out=sensitivities.loads_left_out,
     )
 
 
@@ -372,12 +367,8 @@ def effects_of_parameters(sensitivities: Sensitivity, compliant: Mask) -> list[P
     for path in sensitivities.without_influence:
         if is_of_design(by_path[path]):
             percents_by_path.setdefault(_path_of_element(path, by_path, numbers), no_effect)
-    return strongest_first(
-        [
-            ParameterEffect(path, percents, turning=by_path[path].quantity.kind == "angle")
-            for path, percents in percents_by_path.items()
-        ]
-    )
+    angles = {path for path in percents_by_path if by_path[path].quantity.kind == "angle"}
+    return strongest_first([ParameterEffect(p, row, turning=p in angles) for p, row in percents_by_path.items()])
 
 
 def is_of_design(parameter: Parameter) -> bool:

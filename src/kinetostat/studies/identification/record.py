@@ -47,13 +47,7 @@ class FittedNumber:
 
 
 class Outlier(NamedTuple):
-    """A measured value that a fit has set aside.
-
-    Attributes:
-        line: line of the file of measurements.
-        name: name of the value, "x" or "deflection.z".
-        sigmas: its residual in standard deviations.
-    """
+    """A measured value that a fit sets aside: its line in the file, its name, its residual in standard deviations."""
 
     line: int
     name: str
@@ -61,10 +55,7 @@ class Outlier(NamedTuple):
 
 
 class RecordedUnseen(NamedTuple):
-    """A combination of unknowns that a fit has not seen: its sentence, and its motion of the tool, m.
-
-    `inside` is the part of the motion that other places of base and target do not undo.
-    """
+    """A combination that a fit does not see: a sentence; the motion of the tool, in all and inside the machine, m."""
 
     words: str
     tool: float
@@ -228,6 +219,7 @@ def record_of(path: str, record: Any, pictures: Mapping[str, bytes]) -> FitRecor
         raise ValueError("no covariance of the unknowns")
     if not np.isfinite([unknown.value for unknown in unknowns]).all():
         raise ValueError("a value that is not finite")
+    outliers, unseen = record.get("outliers", []), record.get("unseen", [])
     return FitRecord(
         path=path,
         machine=str(record["machine"]),
@@ -244,12 +236,8 @@ def record_of(path: str, record: Any, pictures: Mapping[str, bytes]) -> FitRecor
             {str(kind): float(size) for kind, size in record.get(name, {}).items()}
             for name in ("before", "after", "left_out")
         ),
-        outliers=tuple(
-            Outlier(int(o["line"]), str(o["value"]), float(o["sigmas"])) for o in record.get("outliers", [])
-        ),
-        unseen=tuple(
-            RecordedUnseen(str(u["words"]), float(u["tool"]), float(u["inside"])) for u in record.get("unseen", [])
-        ),
+        outliers=tuple(Outlier(int(o["line"]), str(o["value"]), float(o["sigmas"])) for o in outliers),
+        unseen=tuple(RecordedUnseen(str(u["words"]), float(u["tool"]), float(u["inside"])) for u in unseen),
         pictures={name: data for name, data in pictures.items() if data.startswith(PNG)},
         home=_numbers(record.get("home", {}).get("actuators", {})),
         senses=_numbers(record.get("home", {}).get("senses", {})),
