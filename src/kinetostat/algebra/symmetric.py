@@ -20,6 +20,11 @@ POSITIONS = [(i, j) for i in range(SIZE) for j in range(i, SIZE)]
 """Row and column of each of the 21 stored entries."""
 _INDEX = {position: k for k, position in enumerate(POSITIONS)}
 """The place of each of these entries, by its row and column."""
+SWEEPS = 4
+"""Sweeps of a 3x3 matrix. In thousands of random matrices, the largest entry off the diagonal is 1e-6 of the greatest
+eigenvalue after three of them and 1e-23 after four; the eigenvalues are wrong by about the square of that."""
+SWEEPS_OF_LARGER = 7
+"""Sweeps of larger matrices. In those of size 8, this entry is 3e-6 after six of them and 3e-10 after seven."""
 
 
 @dataclass(frozen=True)
@@ -55,13 +60,6 @@ class Symmetric6:
     def rows(self) -> list[list[Scalar]]:
         """The full matrix as nested lists [6][6]."""
         return [[self.entry(i, j) for j in range(SIZE)] for i in range(SIZE)]
-
-
-SWEEPS = 4
-"""Sweeps of a 3x3 matrix. In thousands of random matrices, the largest entry off the diagonal is 1e-6 of the greatest
-eigenvalue after three of them and 1e-23 after four; the eigenvalues are wrong by about the square of that."""
-SWEEPS_OF_LARGER = 7
-"""Sweeps of larger matrices. In those of size 8, this entry is 3e-6 after six of them and 3e-10 after seven."""
 
 
 def greatest_eigenvalue(rows: Sequence[Sequence[Scalar]]) -> Scalar:

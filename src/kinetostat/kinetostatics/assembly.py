@@ -8,6 +8,7 @@ Source: theory (4)-(6) and (8)-(11). All screws, K and C are at one reference po
 
 from collections.abc import Sequence
 from itertools import islice
+from typing import NamedTuple
 
 from kinetostat.algebra.scalar import Scalar, is_infinite, larger, reciprocal, total, where
 from kinetostat.algebra.screw import NO_MOTION, Screw, Twist, Wrench
@@ -128,18 +129,12 @@ def _sharing(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench])
     redundant = sum(len(leg.wrenches) for leg in legs) + len(guide) > SIZE
     balanced = [free_springs_as_joints(leg.with_unit_wrenches) for leg in legs] if redundant else legs
     modes = [modes_of(leg) if redundant or _in_series(leg) else _wrenches_as_modes(leg) for leg in balanced]
-    wrenches = [wrench for leg in balanced for wrench in leg.wrenches] + list(guide)
-    if len(wrenches) == SIZE:
-        squares = [square for leg in balanced for square in leg.wrench_squares or [None] * len(leg.wrenches)]
-        twists, singularity_margin = dual_twists(wrenches, length, [*squares, *[None] * len(guide)])
-        rows, doubt = in_modes(modes, [twist.components() for twist in twists]), 0.0
-    else:
-        rows, doubt, singularity_margin = least_energy_rows(modes, wrenches, length)
+    amounts = _amounts_of_modes(balanced, modes, length, guide)
     sharing: list[tuple[Twist, ...]] = []
     flexibility: list[Twist] = []
     motions: list[Motion] = []
-    sizes: list[Scalar] = []
-    remaining_rows = iter(rows)
+    load_squares: list[Scalar] = []
+    remaining_rows = iter(amounts.rows)
     for leg, mode in zip(balanced, modes, strict=True):
         shares = tuple(map(Twist.of, islice(remaining_rows, len(mode.wrenches))))
         spring_twists = [combine(shares, row) if row else NO_MOTION for row in mode.loads]
@@ -148,21 +143,47 @@ def _sharing(legs: Sequence[LegScrews], length: Scalar, guide: Sequence[Wrench])
         # Springs in series: the fewest shares of C are those of the leg's modes; otherwise one per spring.
         if _in_series(leg):
             motions += zip(shares, mode.compliance, strict=True)
-            sizes += mode.amount_squares()
+            load_squares += mode.amount_squares()
         else:
             motions += zip(spring_twists, leg.compliance, strict=True)
-            sizes += leg.load_squares
-    loads = [(s, square) for (_, s), square in zip(motions, sizes, strict=True)]
-    round_off = _round_off(loads, len(wrenches), singularity_margin, length) if redundant else 0.0
+            load_squares += leg.load_squares
+    loads = [(s, square) for (_, s), square in zip(motions, load_squares, strict=True)]
+    margin = amounts.singularity_margin
     return _Sharing(
         modes=modes,
         sharing=sharing,
         flexibility=flexibility,
         motions=motions,
-        singularity_margin=singularity_margin,
-        doubt=doubt,
-        round_off=round_off,
+        singularity_margin=margin,
+        doubt=amounts.doubt,
+        round_off=_round_off(loads, len(amounts.rows), margin, length) if redundant else 0.0,
     )
+
+
+class ModeAmounts(NamedTuple):
+    """Amounts of the modes of all legs, and then of the wrenches of a guide, that balance a load on the platform.
+
+    Attributes:
+        rows: amounts per unit platform wrench [wrenches x 6].
+        doubt: as in `Statics`.
+        singularity_margin: that of W.
+    """
+
+    rows: Sequence[tuple[Scalar, ...]]
+    doubt: Scalar
+    singularity_margin: Scalar
+
+
+def _amounts_of_modes(
+    legs: Sequence[LegScrews], modes: Sequence[Modes], length: Scalar, guide: Sequence[Wrench]
+) -> ModeAmounts:
+    """Balance a load by statics alone if all legs carry six wrenches, else by least energy."""
+    wrenches = [wrench for leg in legs for wrench in leg.wrenches] + list(guide)
+    if len(wrenches) != SIZE:
+        return least_energy_amounts(modes, wrenches, length)
+    squares = [square for leg in legs for square in leg.wrench_squares or [None] * len(leg.wrenches)]
+    twists, singularity_margin = dual_twists(wrenches, length, [*squares, *[None] * len(guide)])
+    return ModeAmounts(in_modes(modes, [twist.components() for twist in twists]), 0.0, singularity_margin)
 
 
 def _round_off(
@@ -274,9 +295,7 @@ def dual_twists(
     return [Twist(Vector(*row[:3]) * shrink, Vector(*row[3:])) for row in rows], singularity_margin
 
 
-def least_energy_rows(
-    modes: Sequence[Modes], wrenches: Sequence[Wrench], length: Scalar
-) -> tuple[list[tuple[Scalar, ...]], Scalar, Scalar]:
+def least_energy_amounts(modes: Sequence[Modes], wrenches: Sequence[Wrench], length: Scalar) -> ModeAmounts:
     """Share a load among legs that carry more than six wrenches: of all balances, that of least elastic energy.
 
     lambda = W+ w + N z with W N = 0 and lambda^T G lambda least (force method). Where rigid parts leave z undecided, no
@@ -287,18 +306,14 @@ def least_energy_rows(
         wrenches: wrenches of all legs in order, and of a guide, which does not deflect: columns of W, at P in base
             axes.
         length: characteristic length, m, which scales rows.
-
-    Returns:
-        Amounts of the modes per unit platform wrench [wrenches x 6]; the doubt as in `Statics`; and the singularity
-        margin of W.
     """
     shrink = reciprocal(length)
     columns = [wrench.in_newtons(shrink) for wrench in wrenches]
     if len(wrenches) < SIZE:
-        return [NO_MOTION.components()] * len(wrenches), 0.0, 0.0
-    balance, internal, singularity_margin = right_inverse([list(row) for row in zip(*columns, strict=True)])
+        return ModeAmounts([NO_MOTION.components()] * len(wrenches), doubt=0.0, singularity_margin=0.0)
+    balances = right_inverse([list(row) for row in zip(*columns, strict=True)])
     compliance = [d for leg in modes for d in leg.compliance]
-    balanced, null = (in_modes(modes, rows) for rows in (balance, [*zip(*internal, strict=True)]))
+    balanced, null = (in_modes(modes, rows) for rows in (balances.solution, [*zip(*balances.null, strict=True)]))
     guides = len(wrenches) - len(compliance)
     weights = compliance + [0.0] * guides
     squares = [square for leg in modes for square in leg.amount_squares()] + [1.0] * guides
@@ -306,7 +321,7 @@ def least_energy_rows(
     for leg in modes:
         doubt = larger(doubt, leg.doubt)
     rows = [(*(c * shrink for c in row[:3]), *row[3:]) for row in zip(*shared, strict=True)]
-    return rows, doubt, singularity_margin
+    return ModeAmounts(rows, doubt, balances.margin)
 
 
 def weighted_sum(shares: Sequence[tuple[Screw, Scalar]], length: Scalar) -> Symmetric6:

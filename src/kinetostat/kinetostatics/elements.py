@@ -26,9 +26,9 @@ SOFTEST = 1e12
 """Factor on compliances beyond which an element counts as not there: its share of any stiffness is then round-off."""
 LINKS_TOGETHER = "links together"
 """Name of all elements but the actuators, as one."""
-SECANTS = 12
+MOST_SECANTS = 12
 """Most steps of the search for the limit of rigidity: they converge faster than by halving, two to eight are needed."""
-SETTLED = 1e-12
+LAST_STEP = 1e-12
 """Share of a factor below which a step of that search is its last: the next one would be round-off."""
 
 
@@ -208,11 +208,11 @@ def _factor_for(response: Response, element: Element, rest: Array, excess: Array
     x_before = excess_with(np.ones_like(rest)) / excess
     y_before = 1.0 / excess_with(1.0 / x_before)
     x = x_before * wanted / y_before
-    for _ in range(SECANTS):
+    for _ in range(MOST_SECANTS):
         y = 1.0 / excess_with(1.0 / x)
         slope = (y - y_before) / (x - x_before)
         step = np.where(np.isfinite(slope) & (slope > 0.0), (wanted - y) / slope, 0.0)
-        is_last = not (np.abs(step) > SETTLED * x).any()
+        is_last = not (np.abs(step) > LAST_STEP * x).any()
         x_before, y_before, x = x, y, np.where(x + step > 0.0, x + step, 0.5 * x)
         if is_last:
             break

@@ -19,7 +19,7 @@ from kinetostat.machine.links import rods
 from kinetostat.machine.machine import springs
 
 ROTATIONS, TRANSLATIONS = range(3), range(3, 6)
-SPACE = 3
+BALL_AXES = 3
 """Axes about which a ball joint turns."""
 
 
@@ -101,7 +101,7 @@ def shortest_leg(response: Response) -> Scalar:
 
 
 def longest_leg(response: Response) -> Scalar:
-    """Greatest such distance, m."""
+    """Greatest distance of the two joints of such a leg, m; NaN if there is none."""
     return -_least([-rod.length for rod in rods(response.configuration.legs) if rod.telescopic])
 
 
@@ -181,9 +181,9 @@ def _ball_signs(leg: Leg) -> Scalar:
     rows = ([leg.passive[i] for i in row if i not in leg.idle] for row in leg.centred)
     joints = [row for row in rows if row]
     for i, joint in enumerate(joints):
-        balls = [other for other in (*joints[max(i - 1, 0) : i], *joints[i + 1 : i + 2]) if len(other) == SPACE]
+        balls = [other for other in (*joints[max(i - 1, 0) : i], *joints[i + 1 : i + 2]) if len(other) == BALL_AXES]
         strut = [end - start for ball in balls[:1] for end in joint[0].path for start in ball[0].path]
-        axes = [*(revolute.axis for revolute in joint), *strut][:SPACE]
-        if len(axes) == SPACE:
+        axes = [*(revolute.axis for revolute in joint), *strut][:BALL_AXES]
+        if len(axes) == BALL_AXES:
             sign = where(axes[0].cross(axes[1]).dot(axes[2]) < 0.0, -sign, sign)
     return sign

@@ -419,6 +419,7 @@ def needs_state(machine: Machine, names: Iterable[str], limited: bool = True) ->
 INDICES: dict[str, Iterable[object]] = {
     group: range(1, count + 1) for group, count in (("tension", MOST_CABLES), ("frequency", MODES))
 }
+"""Ends of the names in a group whose quantities are numbered; those of other groups end in the name of a component."""
 GROUPS = {
     group: tuple(f"{group}_{index}" for index in INDICES.get(group.removeprefix("loaded_"), COMPONENTS))
     for group in (

@@ -26,6 +26,13 @@ from kinetostat.tolerances import DEGENERATE_FACE, SAME_VERTEX, UNRESISTED
 
 spatial = LateModule("scipy.spatial")
 
+UNBOUNDED_FORCE = 1e300
+"""Number that stands for a force without a bound: a face that such a force moves is beyond every wrench."""
+FARTHEST_FACE = 1e200
+"""Distance beyond which a face exists only because of `UNBOUNDED_FORCE`."""
+MOST_NUMBERS = 120_000
+"""Greatest number of entries of an array in a slab: 1 MB, so that it stays in the second level of the cache."""
+
 
 def vertices(normals: Array, bounds: Array) -> Array | None:
     """The vertices of a polytope that holds the origin inside.
@@ -83,14 +90,6 @@ def reach_along(normals: Array, bounds: Array, direction: Array) -> float:
     rates = normals @ direction
     ahead = rates > SAME_VERTEX * np.abs(rates).max(initial=0.0)
     return float(np.min(bounds[ahead] / rates[ahead], initial=math.inf))
-
-
-UNBOUNDED_FORCE = 1e300
-"""Number that stands for a force without a bound: a face that such a force moves is beyond every wrench."""
-FARTHEST_FACE = 1e200
-"""Distance beyond which a face exists only because of `UNBOUNDED_FORCE`."""
-MOST_NUMBERS = 120_000
-"""Greatest number of entries of an array in a slab: 1 MB, so that it stays in the second level of the cache."""
 
 
 @dataclass(frozen=True)
