@@ -14,7 +14,7 @@ from kinetostat.views.sensitivity import coloured_table
 
 def test_a_character_without_a_font_is_shown_by_its_number(monkeypatch):
     monkeypatch.setattr(layout, "_known_characters", lambda: frozenset(map(ord, "abc µ")))
-    assert layout.drawable("ab 機µ") == "ab [U+6A5F]µ"
+    assert layout.drawable_text("ab 機µ") == "ab [U+6A5F]µ"
 
 
 def test_fonts_that_are_installed_are_used(monkeypatch):
@@ -22,11 +22,11 @@ def test_fonts_that_are_installed_are_used(monkeypatch):
         name = "Noto Sans CJK SC"
 
     monkeypatch.setattr(fontManager, "ttflist", [Entry()])
-    layout.families.cache_clear()
+    layout.font_families.cache_clear()
     try:
-        assert layout.families() == ("DejaVu Sans", "Noto Sans CJK SC")
+        assert layout.font_families() == ("DejaVu Sans", "Noto Sans CJK SC")
     finally:
-        layout.families.cache_clear()
+        layout.font_families.cache_clear()
 
 
 def test_a_name_is_drawn_without_a_warning_and_symbols_stay_mathematics():

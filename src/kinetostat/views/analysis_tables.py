@@ -125,8 +125,14 @@ def _load_sentence(analysis: Analysis, load: LoadCase) -> str:
 
 
 def matrix_units(kind: str, display: Display = ENGINEERING) -> str:
-    """Return the units of the blocks of K ("stiffness") or C ("compliance"): rotation, coupling, translation."""
-    return ", ".join(display.scale(unit).unit for unit in MATRIX_UNITS[kind])
+    """Return the units of the blocks of K ("stiffness") or C ("compliance") in a list; see `block_units`."""
+    return ", ".join(block_units(kind, display))
+
+
+def block_units(kind: str, display: Display = ENGINEERING) -> tuple[str, str, str]:
+    """Return the units that people read of the blocks of K or C: rotation, coupling, translation."""
+    rotation, coupling, translation = (display.scale(unit).unit for unit in MATRIX_UNITS[kind])
+    return rotation, coupling, translation
 
 
 def stiffness_table(analysis: Analysis) -> FittedTable:

@@ -259,7 +259,7 @@ BUDGET = Description(
         Field("measures", lambda answer: dict(zip(answer.measures, answer.units, strict=True))),
         Field("leading_measure", "leading"),
         Field("status", lambda answer: status_words(answer.status)),
-        Field("poses", lambda answer: {path: values for path, (values, _) in varied_fields(answer).items()}),
+        Field("poses", lambda answer: {path: column.values for path, column in varied_fields(answer).items()}),
         Field("errors", lambda answer: {s: _by_measure(answer, getattr(answer.spread, s)) for s in STATISTICS}),
         Field("usual_everywhere", lambda a: dict(zip(a.measures, a.spread.everywhere.tolist(), strict=True))),
         Field("machines", "samples"),

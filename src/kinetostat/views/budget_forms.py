@@ -15,7 +15,7 @@ from kinetostat.machine.parameters import data_name
 from kinetostat.studies.budget import STATISTICS, Budget
 from kinetostat.studies.datasets import ABOUT_POSES, ABOUT_STATUS, origin_of
 from kinetostat.units import KINDS
-from kinetostat.views.data_forms import column_head, columns_csv, status_words
+from kinetostat.views.data_forms import Column, column_head, columns_csv, status_words, with_heads
 from kinetostat.views.question import Drawing
 
 if TYPE_CHECKING:
@@ -44,15 +44,16 @@ def ranked_by(answer: Budget) -> list[str]:
     return [name for name in ("along", "position", rotation) if name in answer.measures]
 
 
-def varied_fields(answer: Budget) -> dict[str, tuple[Any, str]]:
-    """Return the coordinates that vary over the poses, by path: values at each pose, and their unit."""
+def varied_fields(answer: Budget) -> dict[str, Column]:
+    """Return the coordinates that vary over the poses, by path, with their values at each pose."""
     if answer.question is not None:
         columns, labels = answer.question.grid.columns(0, answer.question.grid.size), answer.question.labels
         paths = zip(answer.question.fields, answer.question.grid.axes, labels.coords, strict=True)
-        return {path: (columns[axis.paths[0]], labels[name].attrs["units"]) for path, axis, name in paths}
+        return {path: Column(labels[name].attrs["units"], columns[axis.paths[0]]) for path, axis, name in paths}
     if answer.poses is None:
         return {}
-    return {f.path: (values, f.unit) for f, values in zip(answer.poses.fields, answer.poses.values, strict=True)}
+    pairs = zip(answer.poses.fields, answer.poses.values, strict=True)
+    return {field.path: Column(field.unit, values) for field, values in pairs}
 
 
 def contributions_csv(answer: Budget) -> str:
@@ -75,8 +76,7 @@ def poses_csv(answer: Budget) -> str | None:
     if len(answer.status) == 1:
         return None
     columns: dict[str, Any] = {"pose": range(1, len(answer.status) + 1)}
-    varied = varied_fields(answer).items()
-    columns |= {column_head(data_name(path), unit): values for path, (values, unit) in varied}
+    columns |= with_heads({data_name(path): column for path, column in varied_fields(answer).items()})
     columns["status"] = status_words(answer.status)
     for statistic in STATISTICS:
         for measure, unit in zip(answer.measures, answer.units, strict=True):

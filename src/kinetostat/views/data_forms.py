@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from kinetostat.arrays import AnyArray, Codes
 from kinetostat.kinematics.status import Status
 from kinetostat.late import LateModule
 from kinetostat.spec.renamed import RENAMED, with_former_keys
-from kinetostat.views.question import Description, Field, Records
+from kinetostat.views.question import Axis, Description, Field, Records
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -26,8 +26,20 @@ else:  # both take long to load
     h5netcdf = LateModule("h5netcdf")
     h5py = LateModule("h5py")
 
-Variable = tuple[Any, Any, dict[str, str]]
-"""Axes of a variable of NetCDF (the name of one, or several), its values, and its attributes."""
+
+class Variable(NamedTuple):
+    """A variable of NetCDF: the name of its axis or the names of its axes, its values, and its attributes."""
+
+    axes: str | Sequence[str]
+    values: Any
+    attributes: Mapping[str, str]
+
+
+class Column(NamedTuple):
+    """A column of numbers: the unit of its values, SI, and the values."""
+
+    unit: str
+    values: Any
 
 
 def as_answer(data: dict[str, Any]) -> dict[str, Any]:
@@ -85,6 +97,11 @@ def status_words(codes: Codes) -> list[str]:
 def column_head(name: str, unit: str) -> str:
     """Return the head of a column of numbers in a CSV file, "x [m]"; a number without a unit has its name alone."""
     return f"{name} [{unit}]" if unit not in ("", "1") else name
+
+
+def with_heads(columns: Mapping[str, Column]) -> dict[str, Any]:
+    """Return the values of columns by their heads in a CSV file."""
+    return {column_head(name, unit): values for name, (unit, values) in columns.items()}
 
 
 def stiffness_of_spring(stiffness: float | None) -> float | str | None:
@@ -183,7 +200,7 @@ def netcdf_of(description: Description, answer: Any) -> bytes:
     xarray would write it, which takes three times as long to import as to write.
     """
     coordinates: dict[str, Variable] = {
-        axis.name: (axis.name, np.asarray(Field(axis.name, axis.take).of(answer)), _attributes_of(axis))
+        axis.name: Variable(axis.name, np.asarray(Field(axis.name, axis.take).of(answer)), _attributes_of(axis))
         for axis in description.axes
     }
     variables: dict[str, Variable] = {}
@@ -193,49 +210,47 @@ def netcdf_of(description: Description, answer: Any) -> bytes:
         if isinstance(part, Records):
             _add_records(part, part.of(answer), variables, coordinates)
         elif part.axes:
-            variables[part.name] = (part.axes, part.of(answer), _attributes_of(part))
+            variables[part.name] = Variable(part.axes, part.of(answer), _attributes_of(part))
     memory = io.BytesIO()
     with h5netcdf.File(memory, "w") as file:
         file.attrs.update(machine=answer.machine.name, reference=answer.machine.reference)
         for name, variable in (variables | coordinates).items():
-            _write_variable(file, name, *variable)
+            _write_variable(file, name, variable)
     return memory.getvalue()
 
 
-def _write_variable(file: Any, name: str, axes: Any, entries: Any, attributes: dict[str, str]) -> None:
+def _write_variable(file: Any, name: str, variable: Variable) -> None:
     """Write a variable as xarray would: texts of any length, flags as bytes that say so, NaN for missing numbers."""
-    axes, values = (axes,) if isinstance(axes, str) else axes, np.asarray(entries)
+    axes, values = variable.axes, np.asarray(variable.values)
+    axes = (axes,) if isinstance(axes, str) else tuple(axes)
     for axis, size in zip(axes, values.shape, strict=True):
         if axis not in file.dimensions:
             file.dimensions[axis] = size
     kind = values.dtype.kind
     dtype = {"U": h5py.string_dtype(), "b": np.dtype("i1")}.get(kind, values.dtype)
-    variable = file.create_variable(name, tuple(axes), dtype, fillvalue=np.nan if kind == "f" else None)
-    variable[...] = values.astype(object) if kind == "U" else values.astype(dtype)
-    variable.attrs.update(attributes | ({"dtype": "bool"} if kind == "b" else {}))
+    written = file.create_variable(name, axes, dtype, fillvalue=np.nan if kind == "f" else None)
+    written[...] = values.astype(object) if kind == "U" else values.astype(dtype)
+    written.attrs.update({**variable.attributes, **({"dtype": "bool"} if kind == "b" else {})})
 
 
 def _add_records(
     records: Records, items: Sequence[Any], variables: dict[str, Variable], coordinates: dict[str, Variable]
 ) -> None:
     """Add a variable for each field of records, and the axes that they need."""
-    coordinates[records.axis] = (records.axis, np.arange(1, len(items) + 1), {})
+    coordinates[records.axis] = Variable(records.axis, np.arange(1, len(items) + 1), {})
     for part in records.fields:
         if "nc" not in part.forms:
             continue
         values = [part.of(item) for item in items]
         names = _entries(part, items)
         if names is None:
-            variables[part.name] = (
-                records.axis,
-                np.asarray([_scalar(value) for value in values]),
-                _attributes_of(part),
-            )
+            numbers = np.asarray([_scalar(value) for value in values])
+            variables[part.name] = Variable(records.axis, numbers, _attributes_of(part))
         else:
             (axis,) = part.axes
-            coordinates[axis] = (axis, names, {})
+            coordinates[axis] = Variable(axis, names, {})
             rows = [[value.get(name, 0.0) for name in names] for value in values]
-            variables[part.name] = ((records.axis, axis), np.asarray(rows, dtype=float), _attributes_of(part))
+            variables[part.name] = Variable((records.axis, axis), np.asarray(rows, dtype=float), _attributes_of(part))
 
 
 def _scalar(value: Any) -> Any:
@@ -243,5 +258,6 @@ def _scalar(value: Any) -> Any:
     return value if isinstance(value, bool | Real) else np.nan if value is None else str(value)
 
 
-def _attributes_of(part: Any) -> dict[str, str]:
+def _attributes_of(part: Field | Axis) -> dict[str, str]:
+    """Return unit and meaning as attributes of NetCDF, those that there are."""
     return {name: text for name, text in (("units", part.unit), ("long_name", part.long_name)) if text}

@@ -19,7 +19,7 @@ from kinetostat.machine.machine import pose_of, setting_of
 from kinetostat.studies.elevation import USUAL_RANGE, Elevation, elevation
 from kinetostat.units import component_units, load_unit
 from kinetostat.views.command import correction_lines, correction_tables, law_fields
-from kinetostat.views.data_forms import column_head, columns_csv, status_words
+from kinetostat.views.data_forms import Column, column_head, columns_csv, status_words, with_heads
 from kinetostat.views.loaded import KINDS_OF_LOADS, use_of_limit
 from kinetostat.views.question import (
     FIRST_FIELDS,
@@ -130,27 +130,30 @@ def _tables(answer: Elevation, full: bool) -> Iterator[FittedTable]:
     yield from correction_tables(answer.corrections, full)
 
 
-def _columns(answer: Elevation, full: bool = False) -> dict[str, tuple[str, Array]]:
-    """Return the columns of the main table: head, unit and values."""
-    columns = {"sag": ("m", answer.sag), "rotation": ("rad", answer.rotation)}
+def _columns(answer: Elevation, full: bool = False) -> dict[str, Column]:
+    """Return the columns of the main table by their heads; with `full` also the components of the displacement."""
+    columns = {"sag": Column("m", answer.sag), "rotation": Column("rad", answer.rotation)}
     if full:
         units = component_units(answer.components)
-        columns |= {n: (u, v) for n, u, v in zip(answer.components, units, answer.displacement.T, strict=True)}
-    columns["first frequency"] = ("Hz", answer.frequency)
+        columns |= dict(zip(answer.components, map(Column, units, answer.displacement.T), strict=True))
+    columns["first frequency"] = Column("Hz", answer.frequency)
     for turning, kind in KINDS_OF_LOADS:
         chosen = [turns is turning for turns in answer.turning]
         if any(chosen):
-            columns[f"greatest {kind}"] = (load_unit(turning), np.abs(answer.loads[:, chosen]).max(axis=1))
+            greatest = np.abs(answer.loads[:, chosen]).max(axis=1)
+            columns[f"greatest {kind}"] = Column(load_unit(turning), greatest)
     if answer.budget is not None:
-        columns["error, 95 %"] = ("m", answer.error)
+        columns["error, 95 %"] = Column("m", answer.error)
     return columns
 
 
 def _elevation_table(answer: Elevation, full: bool) -> FittedTable:
     display, columns = answer.machine.display, _columns(answer, full)
-    scales = {unit: display.fitting(unit, np.concatenate([v for u, v in columns.values() if u == unit]))
-              for unit, _ in columns.values()}  # fmt: skip
-    heads = [f"{name}\n{scales[unit].head}" for name, (unit, _) in columns.items()]
+    values_by_unit: dict[str, list[Array]] = {}
+    for unit, values in columns.values():
+        values_by_unit.setdefault(unit, []).append(values)
+    scales = {unit: display.fitting(unit, np.concatenate(arrays)) for unit, arrays in values_by_unit.items()}
+    heads = [f"{name}\n{scales[column.unit].head}" for name, column in columns.items()]
     table = numeric_table("Over elevation", f"elevation\n{display.scale('rad').head}", heads)
     for i, height in enumerate(answer.elevations):
         cells = (float(values[i]) * scales[unit].factor for unit, values in columns.values())
@@ -166,8 +169,8 @@ def _loads_table(answer: Elevation) -> FittedTable:
     title = "Loads of actuators, positive where they are pulled"
     table = numeric_table(title, f"elevation\n{display.scale('rad').head}", heads)
     for height, row in zip(answer.elevations, answer.loads, strict=True):
-        cells = (display.number(float(load), unit) if math.isfinite(load) else DASH
-                 for load, unit in zip(row, units, strict=True))  # fmt: skip
+        loads = zip(row.tolist(), units, strict=True)
+        cells = (display.number(load, unit) if math.isfinite(load) else DASH for load, unit in loads)
         table.add_row(display.number(float(height), "rad"), *cells)
     return table
 
@@ -189,7 +192,7 @@ def elevation_csv(answer: Elevation) -> str:
     """Write all numbers over the elevation as CSV in SI: a row for each, with loads and corrections of actuators."""
     columns: dict[str, Any] = {"elevation [rad]": answer.elevations}
     columns["status"] = status_words(answer.statuses)
-    columns |= {column_head(name, unit): values for name, (unit, values) in _columns(answer, full=True).items()}
+    columns |= with_heads(_columns(answer, full=True))
     for name, turning, values in zip(answer.actuators, answer.turning, answer.loads.T, strict=True):
         columns[column_head(f"{name} load", load_unit(turning))] = values
     commands = answer.corrections.command

@@ -49,7 +49,7 @@ these methods, figures are the same, and take longer."""
 
 
 @cache
-def families() -> tuple[str, ...]:
+def font_families() -> tuple[str, ...]:
     """Return the fonts of figures that are installed, the usual one first."""
     installed = {entry.name for entry in fontManager.ttflist}
     return (USUAL_FONT, *(name for name in WIDE_FONTS if name in installed))
@@ -58,11 +58,11 @@ def families() -> tuple[str, ...]:
 @cache
 def _known_characters() -> frozenset[int]:
     """Return the codes of the characters that the installed fonts have."""
-    paths = [fontManager.findfont(name) for name in families()]
+    paths = [fontManager.findfont(name) for name in font_families()]
     return frozenset(code for path in paths for code in get_font(path).get_charmap())
 
 
-def drawable(text: str) -> str:
+def drawable_text(text: str) -> str:
     """Return a text with the number of each character that no installed font has, such as U+6A5F, in its place."""
     return "".join(c if c.isspace() or ord(c) in _known_characters() else f"[U+{ord(c):04X}]" for c in text)
 
@@ -79,8 +79,8 @@ def is_mathematics(text: str) -> bool:
 
 def width_of(labels: Iterable[str], size: float = TICK_LABEL_SIZE) -> float:
     """Return the width of the widest label, inches; the labels stand beside an axis."""
-    font = FontProperties(family=[*families()], size=size)
-    widths = (text_to_path.get_text_width_height_descent(drawable(label), font, False)[0] for label in labels)
+    font = FontProperties(family=[*font_families()], size=size)
+    widths = (text_to_path.get_text_width_height_descent(drawable_text(label), font, False)[0] for label in labels)
     return float(max(widths, default=0.0)) / POINTS_PER_INCH
 
 
@@ -96,13 +96,13 @@ def _texts(artist: Artist) -> Iterator[Text]:
         yield from _texts(part)
 
 
-def letter(figure: Figure) -> None:
+def make_drawable(figure: Figure) -> None:
     """Make all texts of a figure drawable: symbols of quantities are mathematics, names with dollar signs are not."""
     for axis in (axis for panel in figure.axes for axis in (panel.xaxis, panel.yaxis)):
         if isinstance(axis.get_major_locator(), FixedLocator):
             names = axis.get_major_formatter().format_ticks([*axis.get_majorticklocs()])  # also of ticks out of view
-            if any(drawable(name) != name for name in names):
-                axis.set_ticklabels([drawable(name) for name in names])
+            if any(drawable_text(name) != name for name in names):
+                axis.set_ticklabels([drawable_text(name) for name in names])
         if not isinstance(axis.get_major_formatter(), NUMBERS):
             axis.get_ticklabels()  # now they have texts, not only when drawn
     for text in _texts(figure):
@@ -110,14 +110,14 @@ def letter(figure: Figure) -> None:
         if not is_mathematics(written):
             text.set_parse_math(False)
         if not written.isascii():
-            text.set_text(drawable(written))
-            text.set_fontfamily([*families()])
+            text.set_text(drawable_text(written))
+            text.set_fontfamily([*font_families()])
 
 
 def fix_layout(figure: Figure) -> None:
     """Lay out once, not again for each file format, and without drawing anything for it."""
     FigureCanvasAgg(figure)  # without it, each size of a text would be measured by a renderer of its own
-    letter(figure)
+    make_drawable(figure)
     if layout := figure.get_layout_engine():
         with _replaced_methods([(panel, "get_tightbbox", _CachedTightBox(panel).box) for panel in figure.axes]):
             layout.execute(figure)

@@ -1,4 +1,4 @@
-"""Scales of a map: levels of its contours that few extreme poses cannot spoil, and the scales and numbers of its axes.
+"""Levels of the contours of a map, which a few extreme poses cannot spoil, and the layout of its axes.
 
 Nothing is drawn here. Next to a singularity compliance has no bound: levels follow the usual values.
 """
@@ -95,7 +95,10 @@ def exceeded_ends(values: Array, low: float, high: float) -> ExceededEnds:
 
 
 def _round_powers(low: float, high: float) -> Array:
-    """Return 1, 2, 5 (1, 3; 1) times powers of ten from at most `low` to at least `high`: as many as a bar can show."""
+    """Return powers of ten times 1, 2 and 5, times 1 and 3, or alone, from at most `low` to at least `high`.
+
+    They are the first of these that a bar can show all; of more than that many powers of ten, every n-th.
+    """
     first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
     for steps in STEPS_OF_DECADE:
         candidates = [step * 10.0**power for power in range(first, last + 1) for step in steps]
@@ -103,7 +106,7 @@ def _round_powers(low: float, high: float) -> Array:
         chosen = candidates[inner[0] - 1 : inner[-1] + 2]  # with the next one on either side
         if len(chosen) <= LEVELS + 2:
             return np.array(chosen)
-    return np.array([*chosen[: -1 : -(-len(chosen) // LEVELS)], chosen[-1]])
+    return np.array([*chosen[: -1 : math.ceil(len(chosen) / LEVELS)], chosen[-1]])
 
 
 def set_axis_scales(panel: Axes, dataset: "xr.Dataset", across: str, up: str) -> None:

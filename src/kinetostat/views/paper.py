@@ -11,7 +11,6 @@ from importlib.metadata import version
 from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
-from typing import Any
 
 from matplotlib.figure import Figure
 from rich.console import Console
@@ -166,7 +165,7 @@ def in_number(finding: str, count: int) -> str:
     return (verb if count == 1 else verb.removesuffix("s")) + space + rest
 
 
-def _numbers_table(comparisons: Sequence[PaperNumber]) -> Any:
+def _numbers_table(comparisons: Sequence[PaperNumber]) -> Table:
     rows = text_table("Numbers", "place", "", "printed", "computed", "unit", "verdict")
     place = ""
     shown = {

@@ -3,6 +3,7 @@
 Nothing is computed here.
 """
 
+import numpy as np
 import xarray as xr
 
 from kinetostat.display import DASH, number
@@ -13,10 +14,10 @@ from kinetostat.studies.printed_numbers import CITATION
 from kinetostat.studies.report import NOTHING_TO_MAP, Answers
 from kinetostat.views.analysis_tables import (
     actuator_table,
+    block_units,
     compliance_table,
     eigenscrew_table,
     load_table,
-    matrix_units,
     principal_table,
     reaction_table,
     remarks,
@@ -140,7 +141,7 @@ def stiffness_section(analysis: Analysis) -> Section:
 
 def _blocks(kind: str, analysis: Analysis) -> str:
     """Name the units of the blocks of K or C."""
-    return BLOCK_UNITS.format(*matrix_units(kind, analysis.machine.display).split(", "))
+    return BLOCK_UNITS.format(*block_units(kind, analysis.machine.display))
 
 
 def _attribution(analysis: Analysis) -> tuple[Block, ...]:
@@ -225,7 +226,7 @@ def _extremes(maps: xr.Dataset, names: list[str]) -> Table:
     rows, display = [], display_of(maps)
     for name in names:
         values = maps[name].where(maps["status"] == int(Status.OK)).values
-        if (values == values).any():
+        if not np.isnan(values).all():
             least, greatest = float(maps[name].min()), float(maps[name].max())
             ratio = number(greatest / least) if least > 0.0 else DASH
             unit = maps[name].attrs["units"]

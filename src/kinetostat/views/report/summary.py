@@ -161,9 +161,9 @@ def _directions(answers: Answers) -> Table:
     for i, name in enumerate(analysis.components):
         soft, stiff = float(analysis.compliance_diagonal[i]), float(analysis.stiffness_diagonal[i])
         free = math.inf if soft == 0.0 else 1.0 / soft
-        values = [_shown_value(soft, f"compliance_{name}", "free", display)]
-        values += [_shown_value(k, f"stiffness_{name}", "rigid", display) for k in (free, stiff)]
-        rows.append((name, *values, _contributors(analysis, springs, i)))
+        cells = [_shown_value(soft, f"compliance_{name}", "free", display)]
+        cells += [_shown_value(k, f"stiffness_{name}", "rigid", display) for k in (free, stiff)]
+        rows.append((name, *cells, _contributors(analysis, springs, i)))
     caption = (
         f"Each direction at the {analysis.machine.reference}: C is the motion by a unit load in the same direction, "
         "1/C the stiffness with all other motions free to follow, K the stiffness with all other motions held."
@@ -176,6 +176,7 @@ def _shown_value(value: float, quantity: str, infinite: str, display: Display) -
 
 
 def _contributors(analysis: Analysis, springs: Sequence[Spring], i: int) -> str:
+    """Name the parts that contribute most to the i-th entry of the diagonal of C."""
     shares = {part.spring: float(np.nan_to_num(part.compliance_share[i])) for part in analysis.attribution}
     return largest_contributors(*parts_and_kinds(springs, shares)) or "nothing"
 
@@ -250,7 +251,7 @@ def portrait(analysis: Analysis, pictures: MachinePictures, live: bool) -> Figur
 
 def machine_section(analysis: Analysis) -> Section:
     """Write the section with drawings and mobility."""
-    summary = Paragraph(_first_upper(analysis.machine.family.summary))
+    summary = Paragraph(_as_sentence(analysis.machine.family.summary))
     return Section("The machine", (summary, *_mobility(analysis), _drawing(analysis)))
 
 
@@ -266,7 +267,7 @@ def _drawing(analysis: Analysis) -> Figure:
 def _pose_kind(analysis: Analysis, mobility: Mobility) -> str:
     """Say in a sentence or two what kind of pose it is, and how far it is from a singularity."""
     kind = f"{mobility.kind} pose" if mobility.kind is SortOfPose.REGULAR else mobility.kind
-    return f"{_first_upper(kind)} {margin_sentence(analysis)}"
+    return f"{_as_sentence(kind)} {margin_sentence(analysis)}"
 
 
 def _mobility(analysis: Analysis) -> tuple[Block, ...]:
@@ -290,5 +291,6 @@ def data_section(analysis: Analysis) -> Section:
     return Section("Data sheet", (limits_set, *remarks))
 
 
-def _first_upper(text: str) -> str:
+def _as_sentence(text: str) -> str:
+    """Return a phrase with a capital letter and a full stop."""
     return f"{text[0].upper()}{text[1:]}{'' if text.endswith('.') else '.'}"
