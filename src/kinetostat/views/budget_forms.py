@@ -15,7 +15,7 @@ from kinetostat.machine.parameters import data_name
 from kinetostat.studies.budget import STATISTICS, Budget
 from kinetostat.studies.datasets import ABOUT_POSES, ABOUT_STATUS, origin_of
 from kinetostat.units import KINDS
-from kinetostat.views.data_forms import Column, column_head, columns_csv, status_words, with_heads
+from kinetostat.views.data_forms import NumberColumn, column_head, columns_csv, status_words, with_heads
 from kinetostat.views.question import Drawing
 
 if TYPE_CHECKING:
@@ -44,16 +44,16 @@ def ranked_by(answer: Budget) -> list[str]:
     return [name for name in ("along", "position", rotation) if name in answer.measures]
 
 
-def varied_fields(answer: Budget) -> dict[str, Column]:
+def varied_fields(answer: Budget) -> dict[str, NumberColumn]:
     """Return the coordinates that vary over the poses, by path, with their values at each pose."""
     if answer.question is not None:
         columns, labels = answer.question.grid.columns(0, answer.question.grid.size), answer.question.labels
         paths = zip(answer.question.fields, answer.question.grid.axes, labels.coords, strict=True)
-        return {path: Column(labels[name].attrs["units"], columns[axis.paths[0]]) for path, axis, name in paths}
+        return {path: NumberColumn(labels[name].attrs["units"], columns[axis.paths[0]]) for path, axis, name in paths}
     if answer.poses is None:
         return {}
     pairs = zip(answer.poses.fields, answer.poses.values, strict=True)
-    return {field.path: Column(field.unit, values) for field, values in pairs}
+    return {field.path: NumberColumn(field.unit, values) for field, values in pairs}
 
 
 def contributions_csv(answer: Budget) -> str:
@@ -127,11 +127,9 @@ def budget_figures(budget: Budget) -> dict[str, Drawing]:
 
 def _over_poses(budget: Budget, title: str = "{}: error of the tool") -> "Figure":
     dataset, measures, title = budget_dataset(budget), ranked_by(budget), title.format(budget.machine.name)
-    if len(dataset["status"].dims) == 2:
-        # Percentiles of drawn machines have noise, of which a map would draw contours.
-        return grid_figures.contour_maps(dataset, [f"rms_{name}" for name in measures], title)
-    names = [f"{statistic}_{name}" for name in measures for statistic in ("rms", "usual", "worst")]
-    return grid_figures.grid_curves(dataset, names, title)
+    # Percentiles of drawn machines have noise, of which a map would draw contours.
+    statistics = ("rms",) if dataset["status"].ndim == 2 else ("rms", "usual", "worst")
+    return grid_figures.grid_figure(dataset, [f"{s}_{name}" for name in measures for s in statistics], title)
 
 
 def contributions_figure(budget: Budget, title: str = "{}: what the error of the tool is made of") -> "Figure":

@@ -27,7 +27,7 @@ else:  # both take long to load
     h5py = LateModule("h5py")
 
 
-class Variable(NamedTuple):
+class NetcdfVariable(NamedTuple):
     """A variable of NetCDF: the name of its axis or the names of its axes, its values, and its attributes."""
 
     axes: str | Sequence[str]
@@ -35,7 +35,7 @@ class Variable(NamedTuple):
     attributes: Mapping[str, str]
 
 
-class Column(NamedTuple):
+class NumberColumn(NamedTuple):
     """A column of numbers: the unit of its values, SI, and the values."""
 
     unit: str
@@ -99,7 +99,7 @@ def column_head(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
-def with_heads(columns: Mapping[str, Column]) -> dict[str, Any]:
+def with_heads(columns: Mapping[str, NumberColumn]) -> dict[str, Any]:
     """Return the values of columns by their heads in a CSV file."""
     return {column_head(name, unit): values for name, (unit, values) in columns.items()}
 
@@ -199,18 +199,18 @@ def netcdf_of(description: Description, answer: Any) -> bytes:
     Axes are those of the description, and of records their numbers from 1 and the names of mappings. The file is as
     xarray would write it, which takes three times as long to import as to write.
     """
-    coordinates: dict[str, Variable] = {
-        axis.name: Variable(axis.name, np.asarray(Field(axis.name, axis.take).of(answer)), _attributes_of(axis))
+    coordinates: dict[str, NetcdfVariable] = {
+        axis.name: NetcdfVariable(axis.name, np.asarray(Field(axis.name, axis.take).of(answer)), _attributes_of(axis))
         for axis in description.axes
     }
-    variables: dict[str, Variable] = {}
+    variables: dict[str, NetcdfVariable] = {}
     for part in description.fields:
         if "nc" not in part.forms:
             continue
         if isinstance(part, Records):
             _add_records(part, part.of(answer), variables, coordinates)
         elif part.axes:
-            variables[part.name] = Variable(part.axes, part.of(answer), _attributes_of(part))
+            variables[part.name] = NetcdfVariable(part.axes, part.of(answer), _attributes_of(part))
     memory = io.BytesIO()
     with h5netcdf.File(memory, "w") as file:
         file.attrs.update(machine=answer.machine.name, reference=answer.machine.reference)
@@ -219,7 +219,7 @@ def netcdf_of(description: Description, answer: Any) -> bytes:
     return memory.getvalue()
 
 
-def _write_variable(file: Any, name: str, variable: Variable) -> None:
+def _write_variable(file: Any, name: str, variable: NetcdfVariable) -> None:
     """Write a variable as xarray would: texts of any length, flags as bytes that say so, NaN for missing numbers."""
     axes, values = variable.axes, np.asarray(variable.values)
     axes = (axes,) if isinstance(axes, str) else tuple(axes)
@@ -234,10 +234,10 @@ def _write_variable(file: Any, name: str, variable: Variable) -> None:
 
 
 def _add_records(
-    records: Records, items: Sequence[Any], variables: dict[str, Variable], coordinates: dict[str, Variable]
+    records: Records, items: Sequence[Any], variables: dict[str, NetcdfVariable], coordinates: dict[str, NetcdfVariable]
 ) -> None:
     """Add a variable for each field of records, and the axes that they need."""
-    coordinates[records.axis] = Variable(records.axis, np.arange(1, len(items) + 1), {})
+    coordinates[records.axis] = NetcdfVariable(records.axis, np.arange(1, len(items) + 1), {})
     for part in records.fields:
         if "nc" not in part.forms:
             continue
@@ -245,12 +245,14 @@ def _add_records(
         names = _entries(part, items)
         if names is None:
             numbers = np.asarray([_scalar(value) for value in values])
-            variables[part.name] = Variable(records.axis, numbers, _attributes_of(part))
+            variables[part.name] = NetcdfVariable(records.axis, numbers, _attributes_of(part))
         else:
             (axis,) = part.axes
-            coordinates[axis] = Variable(axis, names, {})
+            coordinates[axis] = NetcdfVariable(axis, names, {})
             rows = [[value.get(name, 0.0) for name in names] for value in values]
-            variables[part.name] = Variable((records.axis, axis), np.asarray(rows, dtype=float), _attributes_of(part))
+            variables[part.name] = NetcdfVariable(
+                (records.axis, axis), np.asarray(rows, dtype=float), _attributes_of(part)
+            )
 
 
 def _scalar(value: Any) -> Any:

@@ -19,7 +19,7 @@ from kinetostat.machine.machine import pose_of, setting_of
 from kinetostat.studies.elevation import USUAL_RANGE, Elevation, elevation
 from kinetostat.units import component_units, load_unit
 from kinetostat.views.command import correction_lines, correction_tables, law_fields
-from kinetostat.views.data_forms import Column, column_head, columns_csv, status_words, with_heads
+from kinetostat.views.data_forms import NumberColumn, column_head, columns_csv, status_words, with_heads
 from kinetostat.views.loaded import KINDS_OF_LOADS, use_of_limit
 from kinetostat.views.question import (
     FIRST_FIELDS,
@@ -130,20 +130,20 @@ def _tables(answer: Elevation, full: bool) -> Iterator[FittedTable]:
     yield from correction_tables(answer.corrections, full)
 
 
-def _columns(answer: Elevation, full: bool = False) -> dict[str, Column]:
+def _columns(answer: Elevation, full: bool = False) -> dict[str, NumberColumn]:
     """Return the columns of the main table by their heads; with `full` also the components of the displacement."""
-    columns = {"sag": Column("m", answer.sag), "rotation": Column("rad", answer.rotation)}
+    columns = {"sag": NumberColumn("m", answer.sag), "rotation": NumberColumn("rad", answer.rotation)}
     if full:
         units = component_units(answer.components)
-        columns |= dict(zip(answer.components, map(Column, units, answer.displacement.T), strict=True))
-    columns["first frequency"] = Column("Hz", answer.frequency)
+        columns |= dict(zip(answer.components, map(NumberColumn, units, answer.displacement.T), strict=True))
+    columns["first frequency"] = NumberColumn("Hz", answer.frequency)
     for turning, kind in KINDS_OF_LOADS:
         chosen = [turns is turning for turns in answer.turning]
         if any(chosen):
             greatest = np.abs(answer.loads[:, chosen]).max(axis=1)
-            columns[f"greatest {kind}"] = Column(load_unit(turning), greatest)
+            columns[f"greatest {kind}"] = NumberColumn(load_unit(turning), greatest)
     if answer.budget is not None:
-        columns["error, 95 %"] = Column("m", answer.error)
+        columns["error, 95 %"] = NumberColumn("m", answer.error)
     return columns
 
 

@@ -3,7 +3,7 @@
 Nothing is computed here.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -73,15 +73,23 @@ def grid_figures(dataset: xr.Dataset, title: str = "") -> dict[str, Drawing]:
         dataset: over the grid.
         title: the title of the figure; the name of the machine if empty.
     """
-    by_dimensions: dict[int, tuple[Callable[..., Figure], str, str]] = {
-        1: (grid_curves, "sweep", "The quantities over the parameter that varies."),
-        2: (contour_maps, "map", "The quantities over the two parameters that vary."),
-    }
-    if dataset["status"].ndim not in by_dimensions:
+    if dataset["status"].ndim > 2:
         return {}
-    function, file, caption = by_dimensions[dataset["status"].ndim]
-    draw = partial(function, dataset, quantities_of(dataset), title=title or dataset.attrs["machine"])
-    return {"map": Drawing(caption, draw, file=file)}
+    over_one = dataset["status"].ndim == 1
+    caption = f"The quantities over the {'parameter that varies' if over_one else 'two parameters that vary'}."
+    draw = partial(grid_figure, dataset, quantities_of(dataset), title=title or dataset.attrs["machine"])
+    return {"map": Drawing(caption, draw, file="sweep" if over_one else "map")}
+
+
+def grid_figure(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
+    """Draw quantities over a grid: curves over one dimension, contours over two.
+
+    Args:
+        dataset: one- or two-dimensional, from `studies.datasets.evaluate_grid`.
+        names: the quantities.
+        title: title of the whole figure.
+    """
+    return (grid_curves if dataset["status"].ndim == 1 else contour_maps)(dataset, names, title)
 
 
 def stored_figures(stored: StoredGrid) -> dict[str, Drawing]:
@@ -100,18 +108,12 @@ def carrying_figures(carrying: "Carrying") -> dict[str, Drawing]:
 
 
 def contour_maps(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
-    """Draw a panel for each quantity over the two dimensions of a dataset, its contours labelled with their values.
-
-    Args:
-        dataset: two-dimensional, from `studies.datasets.evaluate_grid`.
-        names: the quantities.
-        title: title of the whole figure.
-    """
+    """Draw a panel for each quantity over two dimensions, contours labelled with their values; see `grid_figure`."""
     rows, columns = grid_shape(len(names))
     (width, height), (room_beside, room_above) = MAP_SIZE, ROOM_BESIDE_MAPS
     size = width * columns + room_beside, height * rows + room_above
     with new_figure(size, title, *setting_lines(dataset)) as figure:
-        mpl.rcParams["axes.grid"] = False
+        mpl.rcParams["axes.grid"] = False  # until the style of the figure ends
         panels, lines = panel_grid(figure, len(names)), []
         for place, (panel, name) in enumerate(zip(panels, names, strict=True)):
             is_lowest, is_first = place + columns >= len(names), place % columns == 0
@@ -130,7 +132,7 @@ def _draw_map(
 
     Args:
         panel: the panel to fill.
-        dataset: two-dimensional, from `studies.datasets.evaluate_grid`.
+        dataset: a dataset of two dimensions.
         name: the quantity.
         labels_across, labels_up: whether the axes are labelled here; else a panel below or to the left has the label.
     """
@@ -147,13 +149,7 @@ def _draw_map(
 
 
 def grid_curves(dataset: xr.Dataset, names: Sequence[str], title: str) -> Figure:
-    """Draw quantities over the one dimension of a dataset, a panel for each unit; logarithmic where the range is.
-
-    Args:
-        dataset: one-dimensional, from `studies.datasets.evaluate_grid`.
-        names: the quantities.
-        title: title of the whole figure.
-    """
+    """Draw quantities over one dimension, a panel for each unit; logarithmic where the range is; see `grid_figure`."""
     (across,) = dataset["status"].dims
     units = list(dict.fromkeys(dataset[name].attrs["units"] for name in names))
     width, height = CURVES_SIZE

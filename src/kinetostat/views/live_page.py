@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from kinetostat.motion.rigid import MotionPlan
 
 TEMPLATES = Path(__file__).with_name("live")
+"""Folder of the page's script, style and elements."""
 LENGTH_RANGE, ANGLE_RANGE, SHARE_RANGE = 0.4, math.radians(30.0), 0.5
 """Ranges of sliders about the value in the file: of lengths, in units of the machine's length; of angles, rad; of other
 numbers, as a share of themselves. Most machines reach a good part of them."""
@@ -69,12 +70,12 @@ INDICES = (
 )
 """Quantities that a page shows where none is named."""
 FORMAT, VIEWER = 1, "viewer.html"
-"""Version of what an address holds, and the page that the documentation has for it."""
+"""Version of what an address holds, which a page must know, and the page that the documentation has for it."""
 LONGEST_ADDRESS = 8000
 """Characters of a machine as part of an address: all browsers and most mail programs take so many. What it can do
 without is left out until it fits."""
 SPARE = (("shares", "parts"), ("slopes", "forward"), ("", "file"))
-"""Programs that an address can do without, first the first, and the data that go with them."""
+"""Pairs that an address can do without, first the first: a program, if any, and the key of the data that go with it."""
 
 
 def write(
@@ -139,12 +140,12 @@ def address_of(functions: MachineFunctions, stem: str) -> str:
     """
     content = _page_content(functions, stem)
     content["data"]["samples"] = content["data"]["samples"][:1]
-    for program, word in SPARE:
+    for program, key in SPARE:
         text = _compressed_text(content)
         if len(text) <= LONGEST_ADDRESS:
             return text
         content["packed"].pop(program, None)
-        content["data"][word] = None
+        content["data"][key] = None
     return _compressed_text(content)
 
 
@@ -251,7 +252,7 @@ def _sliders(functions: MachineFunctions) -> list[dict[str, Any]]:
     for path, kind in functions.arguments:
         home = float(numbers[path])
         ranges = {"length": LENGTH_RANGE * functions.length, "angle": ANGLE_RANGE}
-        reach = ranges.get(kind, SHARE_RANGE * abs(home) or 1.0)
+        reach = ranges.get(kind, SHARE_RANGE * abs(home) or 1.0)  # a number that is 0 has no share: 1 in SI
         ends = {"home": home, "low": home - reach, "high": home + reach}
         rows.append({"name": path.removeprefix(POSE), "si": KINDS[kind].unit, **ends})
     return rows

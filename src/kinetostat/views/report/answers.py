@@ -18,7 +18,7 @@ from kinetostat.studies.report import REPORT_QUESTIONS, Answers
 from kinetostat.studies.under_load import LoadedState
 from kinetostat.validation.comparison import Validation
 from kinetostat.views.answers import description_of
-from kinetostat.views.grid_figures import contour_maps, grid_curves
+from kinetostat.views.grid_figures import grid_figure
 from kinetostat.views.guidelines import GUIDELINES
 from kinetostat.views.identification import RECORDED_FIT
 from kinetostat.views.identification_figures import FIT_CAPTIONS
@@ -113,9 +113,8 @@ def _frequencies(answers: Answers) -> Iterator[Block]:
     """Give a map of the first natural frequency over the poses of the maps, if there is one."""
     over = answers.of("frequencies")
     if over is not None and (over["status"] == int(Status.OK)).any():
-        draw = contour_maps if over["status"].ndim == 2 else grid_curves
         names = [str(name) for name in over.data_vars if "frequency" in str(name)]
-        yield as_figure(draw(over, names, ""), "The first natural frequency over the poses.")
+        yield as_figure(grid_figure(over, names, ""), "The first natural frequency over the poses.")
 
 
 def loaded_section(state: LoadedState, answers: Answers) -> Section:

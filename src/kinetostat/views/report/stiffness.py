@@ -26,7 +26,7 @@ from kinetostat.views.analysis_tables import (
 )
 from kinetostat.views.figures import missing_line
 from kinetostat.views.grid import axis_values, display_of
-from kinetostat.views.grid_figures import contour_maps, grid_curves
+from kinetostat.views.grid_figures import grid_figure
 from kinetostat.views.report.content import (
     Block,
     Figure,
@@ -213,10 +213,9 @@ def _blocks_of_maps(maps: xr.Dataset) -> list[Block]:
     setting = typeset(f"Over {' and '.join(spans)}: {count} points, all other values as in the data sheet; {outcome}.")
     if (maps["status"] != int(Status.OK)).all():
         return [Paragraph(setting)]
-    draw = contour_maps if len(dims) == 2 else grid_curves
     return [
         Paragraph(setting),
-        as_figure(draw(maps, names, ""), "Compliance in each direction over the poses."),
+        as_figure(grid_figure(maps, names, ""), "Compliance in each direction over the poses."),
         _extremes(maps, names),
     ]
 
