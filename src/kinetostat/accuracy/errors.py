@@ -14,7 +14,7 @@ Source: theory (45) and (49).
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -147,20 +147,18 @@ def _candidates(number: int, row: LegRow, rows: HomeRows) -> Iterator[tuple[int,
     for place, unit in enumerate(row.units):
         joint = _JointErrors(number, row.name, unit)
         if unit.drive:
-            yield from ((ZEROS, source) for source in joint.drive(row, unit.drive))
+            yield from _ranked(ZEROS, joint.drive(row, unit.drive))
         if place == 0:
-            yield from ((BASE, joint.shift(name, axis, "on the base")) for name, axis in _named_directions(None))
+            yield from _ranked(BASE, joint.shifts("on the base"))
         else:
             yield from _errors_of_link(joint, row.units[place - 1].name, last_point, NO_LINK * rows.length)
         point = unit.point or last_point or ZERO
         if unit.kind != "ball":
-            yield from (
-                (TILTS, joint.tilt(name, axis, point)) for name, axis in _named_directions(_axis_without_tilt(unit))
-            )
+            yield from _ranked(TILTS, joint.tilts(point))
         if unit.kind == "universal":
-            yield from ((OFFSETS, source) for source in joint.between_axes(point))
+            yield from _ranked(OFFSETS, joint.between_axes(point))
         if unit.bars:
-            yield from ((LENGTHS, source) for source in joint.bars(unit.bars, row.coordinate[unit.first]))
+            yield from _ranked(LENGTHS, joint.bars(unit.bars, row.coordinate[unit.first]))
         last_point = unit.point or last_point
     axes = [Vector(*column) for column in rows.rotation.T.tolist()]
     last_joint, end = _JointErrors(number, row.name, row.units[-1]), len(row.twists)
@@ -178,13 +176,17 @@ def _errors_of_link(
     """
     point = joint.unit.point
     if point is None or last_point is None:
-        yield from ((LINKS, joint.shift(name, axis, "on its link")) for name, axis in _named_directions(None))
+        yield from _ranked(LINKS, joint.shifts("on its link"))
     elif (span := point - last_point).norm() > no_link:
         along = span * (1.0 / span.norm())
         yield LENGTHS, joint.length(along, joint_before)
-        yield from ((LINKS, joint.shift(name, axis, "on its link")) for name, axis in _named_directions(along))
+        yield from _ranked(LINKS, joint.shifts("on its link", along))
     elif joint.unit.kind != "ball":
-        yield from ((OFFSETS, joint.shift(name, axis, "on its link")) for name, axis in _named_directions(None))
+        yield from _ranked(OFFSETS, joint.shifts("on its link"))
+
+
+def _ranked(rank: int, sources: Iterable[ErrorSource]) -> Iterator[tuple[int, ErrorSource]]:
+    return ((rank, source) for source in sources)
 
 
 def _clearances(number: int, row: LegRow) -> Iterator[ErrorSource]:
@@ -195,11 +197,6 @@ def _clearances(number: int, row: LegRow) -> Iterator[ErrorSource]:
         joint = _JointErrors(number, row.name, unit)
         for name, axis in _named_directions(unit.axes[0] if unit.kind == "slide" else None):
             yield joint.clearance(name, axis)
-
-
-def _axis_without_tilt(unit: Unit) -> Vector | None:
-    """Return the axis about which a tilt changes nothing; None for a parallelogram, whose side may tilt about any."""
-    return unit.axes[0] if unit.bars is None else None
 
 
 def _named_directions(axis: Vector | None) -> list[tuple[str, Vector]]:
@@ -217,7 +214,7 @@ def _named_directions(axis: Vector | None) -> list[tuple[str, Vector]]:
 def _direction(axis: Vector) -> str:
     """Return the name of a base axis, or the components of another direction."""
     for name, base in zip("xyz", AXES, strict=True):
-        if abs(axis.dot(base)) > 1.0 - PARALLEL_AXES:
+        if abs(axis.dot(base)) > 1.0 - PARALLEL_AXES:  # by the cosine: up to an angle of 1e-6, for words
             return name
     return "(" + ", ".join(f"{float(c) + 0.0:.2f}" for c in axis.components()) + ")"
 
@@ -255,10 +252,11 @@ class _JointErrors:
     def _of(self) -> str:
         return self.leg if "leg" in self.leg else f'leg "{self.leg}"'
 
-    def shift(self, name: str, axis: Vector, where: str) -> ErrorSource:
-        """Return the error of a joint that lies elsewhere on the base or on its link."""
-        words = f"position of the {self.title} {where} along {_direction(axis)}"
-        return self._source(name, "length", words, _slide(axis))
+    def shifts(self, where: str, along: Vector | None = None) -> Iterator[ErrorSource]:
+        """Generate the errors of a joint that lies elsewhere on the base or on its link; none along the link."""
+        for name, axis in _named_directions(along):
+            words = f"position of the {self.title} {where} along {_direction(axis)}"
+            yield self._source(name, "length", words, _slide(axis))
 
     def platform_shift(self, name: str, axis: Vector, end: int) -> ErrorSource:
         """Return the error of the last joint that lies elsewhere on the platform, which is so much behind."""
@@ -270,11 +268,12 @@ class _JointErrors:
         words = f"length of {self._of} from its {before} to its {self.unit.name}"
         return self._source("length", "length", words, _slide(along))
 
-    def tilt(self, name: str, axis: Vector, point: Vector) -> ErrorSource:
-        """Return the error of a joint whose axes are turned on the link before it."""
-        part = "near side" if self.unit.bars is not None else "axis"
-        words = f"direction of the {part} of the {self.title} about {_direction(axis)}"
-        return self._source(f"r{name}", "angle", words, _turn(axis, point))
+    def tilts(self, point: Vector) -> Iterator[ErrorSource]:
+        """Generate the errors of a joint whose axes are turned on the link before it; none about its own first axis."""
+        part, own_axis = ("axis", self.unit.axes[0]) if self.unit.bars is None else ("near side", None)
+        for name, axis in _named_directions(own_axis):
+            words = f"direction of the {part} of the {self.title} about {_direction(axis)}"
+            yield self._source(f"r{name}", "angle", words, _turn(axis, point))
 
     def platform_tilt(self, name: str, axis: Vector, point: Vector, end: int) -> ErrorSource:
         """Return the error of the last joint that is turned on the platform, behind all motions of the leg."""
