@@ -69,21 +69,21 @@ def test_only_motions_that_a_machine_has_are_offered():
 def test_a_joint_goes_where_it_is_pulled_by_geometry_alone(of):
     machine = load(HEXAPOD, ["pose.x=1 cm", "pose.pitch=4 deg"])
     configuration = state_of(machine).configuration
-    handle = next(h for h in handles(configuration, ()) if (h.of, h.leg) == (of, "leg 3"))
+    handle = next(h for h in handles(configuration, ()) if (h.kind, h.leg) == (of, "leg 3"))
     up = configuration.platform.rotation if of == HEAD else None
     along = up.x if up else Vector(1.0, 0.0, 0.0)
     goal = handle.point + along * 0.004
     numbers = numbers_after_pull(Pull(machine, of, "leg 3", "", point_goal(goal.components())))
     assert all(path.startswith("geometry.") for path in numbers)
     after = state_of(with_values(machine, numbers)).configuration
-    reached = next(h for h in handles(after, ()) if (h.of, h.leg) == (of, "leg 3")).point
+    reached = next(h for h in handles(after, ()) if (h.kind, h.leg) == (of, "leg 3")).point
     assert (reached - goal).norm() < 1e-6
     assert (after.platform.translation - configuration.platform.translation).norm() == 0.0
 
 
 def test_a_joint_of_a_machine_leg_by_leg_moves_alone():
     machine = load("tripteron")
-    handle = next(h for h in handles(state_of(machine).configuration, ()) if (h.of, h.leg) == (HEAD, "z"))
+    handle = next(h for h in handles(state_of(machine).configuration, ()) if (h.kind, h.leg) == (HEAD, "z"))
     goal = handle.point + Vector(0.01, 0.005, 0.0)
     numbers = numbers_after_pull(Pull(machine, HEAD, "z", "", point_goal(goal.components())))
     changed = {path for path, number in numbers.items() if abs(number - values(machine)[path]) > 1e-6}

@@ -16,7 +16,10 @@ if TYPE_CHECKING:
     from kinetostat.commands.common import Commands
     from kinetostat.studies.diagnosis import InstallationCheck
 
+KNOWN_MACHINE = "zhang-gosselin-4dof"
+"""The paper's machine, whose picture is drawn to see whether drawing works."""
 SOUNDNESS_MARKS = {"sound": ("✓", "green"), "absent": ("–", "bright_black"), "failed": ("✗", "bold red")}
+"""Mark and style of a check by its state."""
 NAME_WIDTH = 14
 """Characters for the name of what is checked: most have fewer, and a longer one ends in an ellipsis."""
 
@@ -100,7 +103,7 @@ def _picture_size() -> str:
     from kinetostat.views.drawing import three_views
 
     stream = BytesIO()
-    machine = load("zhang-gosselin-4dof")
+    machine = load(KNOWN_MACHINE)
     three_views(machine, machine.name).savefig(stream)
     return f"the paper's machine drawn, {stream.tell() / 1000:.0f} kB"
 
@@ -110,11 +113,11 @@ def print_checks(console: "Console", checks: "Iterable[InstallationCheck]") -> "
     from rich.table import Table
     from rich.text import Text
 
-    shown: list[InstallationCheck] = []
+    printed: list[InstallationCheck] = []
     for check in checks:
-        if not shown or shown[-1].group != check.group:
-            console.print(Text(("\n" if shown else "") + check.group.capitalize(), "bold"))
-        shown.append(check)
+        if not printed or printed[-1].group != check.group:
+            console.print(Text(("\n" if printed else "") + check.group.capitalize(), "bold"))
+        printed.append(check)
         mark, style = SOUNDNESS_MARKS[check.state]
         line = Table.grid(padding=(0, 2, 0, 0))
         for width in (1, NAME_WIDTH, None):
@@ -123,10 +126,10 @@ def print_checks(console: "Console", checks: "Iterable[InstallationCheck]") -> "
         if check.fix:
             line.add_row("", "", Text(f"→ {check.fix}", "cyan"))
         console.print(line)
-    failed = [check.name for check in shown if check.is_failed]
-    if failed:
-        console.print(Text.assemble(("\nTo repair:", "bold red"), f" {', '.join(failed)}."))
+    failures = [check.name for check in printed if check.is_failed]
+    if failures:
+        console.print(Text.assemble(("\nTo repair:", "bold red"), f" {', '.join(failures)}."))
     else:
         sound = " Everything needed is installed; the self-test gives the known numbers."
         console.print(Text.assemble(("\nSound.", "bold green"), sound))
-    return shown
+    return printed

@@ -7,7 +7,7 @@ standard output and standard error, so that none of them has to say that it is b
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -23,7 +23,7 @@ class SilenceWatch:
     """Says on a terminal what a command is doing while nothing is printed, until its result is.
 
     Attributes:
-        ends_with_any_output: whether a word on standard error ends it as well, as that of a server, which then waits.
+        ends_with_any_output: whether a word on standard error ends it as well: a server prints only there, then waits.
     """
 
     ends_with_any_output = False
@@ -32,8 +32,8 @@ class SilenceWatch:
         self._words = words
         self._terminal = terminal
         self._lock = threading.RLock()
-        self._heard = time.monotonic()
-        self._spoken = False
+        self._last_heard = time.monotonic()
+        self._is_shown = False  # whether the words stand on the terminal
         self._over = threading.Event()
         threading.Thread(target=self._watch, daemon=True).start()
 
@@ -41,7 +41,7 @@ class SilenceWatch:
         """Say from now on that the command is doing this."""
         with self._lock:
             self._words = words
-            if self._spoken:
+            if self._is_shown:
                 self._write(f"{CLEAR_LINE}{words} ...")
 
     def hear(self) -> None:
@@ -49,10 +49,10 @@ class SilenceWatch:
         if self.ends_with_any_output:
             self._over.set()
         with self._lock:
-            if self._spoken:
+            if self._is_shown:
                 self._write(CLEAR_LINE)
-            self._spoken = False
-            self._heard = time.monotonic()
+            self._is_shown = False
+            self._last_heard = time.monotonic()
 
     def end(self) -> None:
         """Say no more: the result is being printed."""
@@ -60,31 +60,31 @@ class SilenceWatch:
         self.hear()
 
     def _watch(self) -> None:
-        while not self._over.wait(max(self._heard + SILENT_SECONDS - time.monotonic(), HEAD_START_SECONDS)):
+        while not self._over.wait(max(self._last_heard + SILENT_SECONDS - time.monotonic(), HEAD_START_SECONDS)):
             if self._is_silent() and not self._over.wait(HEAD_START_SECONDS) and self._is_silent():
                 with self._lock:
                     if self._is_silent() and not self._over.is_set():
                         self._write(f"{self._words} ...")
-                        self._spoken = True
+                        self._is_shown = True
 
     def _write(self, text: str) -> None:
         self._terminal.write(text)
         self._terminal.flush()
 
     def _is_silent(self) -> bool:
-        return not self._spoken and time.monotonic() >= self._heard + SILENT_SECONDS
+        return not self._is_shown and time.monotonic() >= self._last_heard + SILENT_SECONDS
 
 
 class HeardStream:
     """A stream that says that it is written to before it is; in all else it is the stream."""
 
-    def __init__(self, stream: Any, heard: Any) -> None:
+    def __init__(self, stream: Any, hear: Callable[[], None]) -> None:
         self._stream = stream
-        self._heard = heard
+        self._hear = hear
 
     def write(self, text: str) -> int:
         """Write a text."""
-        self._heard()
+        self._hear()
         return int(self._stream.write(text))
 
     def __getattr__(self, name: str) -> Any:

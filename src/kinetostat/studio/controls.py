@@ -1,6 +1,7 @@
 """The numbers that the page offers as sliders: which there are, in which panel, over which range.
 
-Positions of a slider become SI values and back; the sliders themselves are elements of the page.
+Positions of a slider become SI values and back; the sliders themselves are elements of the page. The factor by which
+the deflected shape is exaggerated has a slider as well, although the machine has no such number.
 """
 
 import math
@@ -29,6 +30,8 @@ STIFFNESS_FACTOR = 1e3
 """Factor by which a stiffness varies about its value, up and down: from a rubber to a rigid part."""
 USUAL_STIFFNESS = 1e6
 """Middle of the range of a stiffness that is rigid or free, SI: between soft bearings and stiff links."""
+OTHER_FACTOR = 10.0
+"""Factor by which any other number varies about its value, up and down: a decade each way."""
 LARGEST_LOAD = {"force": 1000.0, "moment": 100.0, "acceleration": 9.81}
 """Ends of the range of a load that is zero: N, N·m, m/s²."""
 OF_MASSES = (*DYNAMIC_FIELDS, "tool.mass", "tool.centre_of_mass", "tool.payload")
@@ -66,6 +69,16 @@ OF_LOADED_STATES = (
 LEAST_SHARE = 0.02
 """Lower end of a number that must be positive, as a share of the upper end: the slider comes near zero and stays
 above."""
+DERIVED_FIELDS = ("axis", "first_axis", "second_axis")
+"""Fields of a joint that may follow from another joint: `axis = "ball"` points to the ball joint."""
+AUTO = "auto"
+"""Word that leaves the choice of the exaggeration, the factor by which the deflected shape is drawn, to the page."""
+FACTOR_DECADES = (-3, 9)
+"""Powers of ten between which the factor lies: shapes smaller than they are, and picometres as centimetres."""
+ROUND_FACTORS = (1.0, 2.0, 5.0)
+"""Factors within a power of ten: about equal steps to the eye."""
+FACTOR_STEPS = len(ROUND_FACTORS) * (FACTOR_DECADES[1] - FACTOR_DECADES[0])
+"""Positions of the slider: 1, 2 and 5 times every power of ten."""
 
 
 @dataclass(frozen=True)
@@ -134,10 +147,6 @@ class Control:
         return round(SLIDER_STEPS * min(max(share, 0.0), 1.0))
 
 
-DERIVED_FIELDS = ("axis", "first_axis", "second_axis")
-"""Fields of a joint that may follow from another joint: `axis = "ball"` points to the ball joint."""
-
-
 def controls(machine: Machine, length: float) -> tuple[Control, ...]:
     """Return all controls of a machine, in the order of its file.
 
@@ -146,15 +155,16 @@ def controls(machine: Machine, length: float) -> tuple[Control, ...]:
         length: its characteristic length, m.
     """
     present, derived = values(machine), _derived_fields(machine)
-    made = (_control(parameter, present, length) for parameter in _offered_parameters(machine, present))
+    offered = (_control(parameter, present, length) for parameter in _offered_parameters(machine, present))
     # What the file derives has no slider: it would undo the derivation. It can still be typed.
     return tuple(
-        replace(each, low=0.0, high=0.0) if each.parameter.path.rpartition(".")[0] in derived else each for each in made
+        replace(control, low=0.0, high=0.0) if control.path.rpartition(".")[0] in derived else control
+        for control in offered
     )
 
 
 def _derived_fields(machine: Machine) -> set[str]:
-    """Paths of the axes of joints that a file leg by leg does not write: they follow from where other joints are."""
+    """Return the axes of joints that a file leg by leg does not write: they follow from where other joints are."""
     if machine.family.chains is None or machine.written is None:
         return set()
     legs = parse(machine.written.text, machine.name).get("legs", [])
@@ -176,30 +186,27 @@ def _offered_parameters(machine: Machine, present: dict[str, float]) -> Iterator
 
     Of an inertia the three moments move together: no body has a moment about one axis alone.
     """
-    for every in parameters(machine.family):
-        if every.path.startswith("cables.") and not cable_signs(machine):
+    for parameter in parameters(machine.family):
+        if parameter.path.startswith("cables.") and not cable_signs(machine):
             continue
-        is_inertia = every.quantity.kind == "inertia" and len(every.leaves) > 1
-        parameter = replace(every, leaves=every.leaves[: len(AXES)]) if is_inertia else every
-        several = len(parameter.leaves) > 1
-        alike = len({present[leaf] for leaf in parameter.leaves}) == 1
-        vector = parameter.path.split(".")[-1] in VECTORS
-        if not several or (not vector and (alike or parameter.quantity.stiff)):
-            yield parameter
+        is_inertia = parameter.quantity.kind == "inertia" and len(parameter.leaves) > 1
+        joined = replace(parameter, leaves=parameter.leaves[: len(AXES)]) if is_inertia else parameter
+        are_alike = len({present[leaf] for leaf in joined.leaves}) == 1
+        is_vector = joined.path.split(".")[-1] in VECTORS
+        if len(joined.leaves) == 1 or (not is_vector and (are_alike or joined.quantity.stiff)):
+            yield joined
 
 
 def _control(parameter: Parameter, present: dict[str, float], length: float) -> Control:
     panel, quantity, value = _panel_of(parameter), parameter.quantity, present[parameter.leaves[0]]
-    usual = _usual(parameter, length) if panel == "Mass" else None
+    largest_from_zero = _largest_from_zero(parameter, length) if panel == "Mass" else None
     logarithmic = False
     if quantity.unset is not None:
         low = high = 0.0  # a limit that may be missing has no range
-    elif usual is not None:
-        high = HEADROOM * abs(value) or usual
-        is_product = quantity.kind == "inertia" and label(parameter).endswith(PRODUCTS_OF_INERTIA)
-        low = -high if is_product else LEAST_SHARE * high if quantity.positive else 0.0
+    elif largest_from_zero is not None:
+        low, high = _range_of_mass(parameter, HEADROOM * abs(value) or largest_from_zero)
     else:
-        low, high, logarithmic = _range(parameter, value, length)
+        low, high, logarithmic = _range_about(parameter, value, length)
         if quantity.positive and not quantity.stiff:
             low = max(low, LEAST_SHARE * high, quantity.least)
         high = min(high, quantity.most)
@@ -208,17 +215,26 @@ def _control(parameter: Parameter, present: dict[str, float], length: float) -> 
     )
 
 
+def _range_of_mass(parameter: Parameter, high: float) -> tuple[float, float]:
+    """Return the ends of the slider of an amount of matter with this upper end; it begins at zero if it may be zero."""
+    if parameter.quantity.kind == "inertia" and label(parameter).endswith(PRODUCTS_OF_INERTIA):
+        return -high, high
+    return LEAST_SHARE * high if parameter.quantity.positive else 0.0, high
+
+
 def _panel_of(parameter: Parameter) -> str:
     table = parameter.path.split(".")[0]
     if parameter.path.startswith(OF_MASSES) or KINDS[parameter.quantity.kind].heavy:
         return "Mass"
     if table in ("load", "tool", "limits", "cables") or parameter.path.startswith(OF_LOADED_STATES):
         return "Load"
-    return "Stiffness" if parameter.quantity.stiff else "Pose" if table == "pose" else "Geometry"
+    if parameter.quantity.stiff:
+        return "Stiffness"
+    return "Pose" if table == "pose" else "Geometry"
 
 
-def _range(parameter: Parameter, value: float, length: float) -> tuple[float, float, bool]:
-    """Return the ends of a slider and whether it is logarithmic."""
+def _range_about(parameter: Parameter, value: float, length: float) -> tuple[float, float, bool]:
+    """Return the ends of a slider about a value, and whether it is logarithmic."""
     kind, table = parameter.quantity.kind, parameter.path.split(".")[0]
     if parameter.quantity.stiff:
         middle = value if 0.0 < value < math.inf else USUAL_STIFFNESS
@@ -235,26 +251,14 @@ def _range(parameter: Parameter, value: float, length: float) -> tuple[float, fl
     if kind == "direction":
         most = max(1.0, abs(value))
         return -most, most, False
-    return value / 10.0, value * 10.0, True
+    return value / OTHER_FACTOR, value * OTHER_FACTOR, True
 
 
-def _usual(parameter: Parameter, length: float) -> float | None:
+def _largest_from_zero(parameter: Parameter, length: float) -> float | None:
     """Return the upper end of the slider of a number that is zero; None for what has a range as any other number."""
     mass = LARGEST_MASS * length**2
     kinds = {"mass": mass, "inertia": mass * length**2, "linear density": mass / (SLENDERNESS * length)}
     return LARGEST_OTHERS.get(parameter.path, kinds.get(parameter.quantity.kind))
-
-
-# The factor by which the deflected shape is exaggerated: a slider as well, but no number of the machine.
-
-AUTO = "auto"
-"""Word that leaves the choice of the factor to the page."""
-FACTOR_DECADES = (-3, 9)
-"""Powers of ten between which the factor lies: shapes smaller than they are, and picometres as centimetres."""
-ROUND_FACTORS = (1.0, 2.0, 5.0)
-"""Factors within a power of ten: about equal steps to the eye."""
-FACTOR_STEPS = len(ROUND_FACTORS) * (FACTOR_DECADES[1] - FACTOR_DECADES[0])
-"""Positions of the slider: 1, 2 and 5 times every power of ten."""
 
 
 def factor_at(position: int) -> float:

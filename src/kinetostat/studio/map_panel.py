@@ -34,6 +34,8 @@ MARGIN_POINTS = 2
 """Points of the map that are kept about the part of a range that can be reached, so that its edge is seen."""
 MOSTLY_REACHED = 0.8
 """Share of a range from which on it is left as it is: there is nothing to gain by cutting it."""
+NO_MAP = np.full(4, np.nan)
+"""Values in the place of a map that is refused: two by two points, all without a value."""
 RANGE_HINT = 'range of the {} axis, such as "-5 to 8 cm"; empty for where the machine can be'
 
 
@@ -61,9 +63,9 @@ class MapPanel:
         self.view.on("pick", self._pick, throttle=THROTTLE)
         self.view.on("settle", self._settle)
         self.time = ui.label("").classes("server-time").mark("map-time")
-        self._is_users_choice = False  # a choice that `fill` makes asks for no new map
-        self._chosen_ranges: dict[str, tuple[float, float]] = {}
-        self._reached: dict[str, tuple[float, float]] = {}
+        self._is_users_choice = False  # whether a change of a list is the designer's; those of `fill` ask for no map
+        self._chosen_ranges: dict[str, tuple[float, float]] = {}  # as they were typed; they count before all others
+        self._reached: dict[str, tuple[float, float]] = {}  # ends of a range within which the first map had values
         self._is_first_map = True  # of these axes: its ranges may still be narrowed
         self.fill()
 
@@ -71,7 +73,7 @@ class MapPanel:
         """Offer the numbers and quantities of a machine that has just been loaded; nothing is computed yet."""
         self._is_users_choice = False
         self._chosen_ranges.clear()
-        self._fit_anew()
+        self._forget_reached()
         fields = {control.path: full_label(control.parameter) for control in self._mappable()}
         first, second, *_ = fields
         self._offer_quantities()
@@ -118,13 +120,13 @@ class MapPanel:
 
     def _ends_of(self, path: str) -> Ends:
         control = self._session.controls[path]
-        here = self._session.value(path)
+        present = self._session.value(path)
         low, high = self._reached.get(path, (control.low, control.high))
-        if not low <= here <= high:  # the machine has left what could be reached when the map was opened
+        if not low <= present <= high:  # the machine has left what could be reached when the map was opened
             low, high = control.low, control.high
         return Ends(path, *self._chosen_ranges.get(path, (low, high)))
 
-    def _fit_anew(self) -> None:
+    def _forget_reached(self) -> None:
         """Let the next map open on what can be reached: its ranges are narrowed if it is mostly empty."""
         self._reached.clear()
         self._is_first_map = True
@@ -135,8 +137,9 @@ class MapPanel:
         reached = np.isfinite(values).reshape(points, points)
         if not reached.any():
             return False
-        for ends, inside in ((request.across, reached.any(axis=1)), (request.up, reached.any(axis=0))):
-            places = np.flatnonzero(inside)
+        # The second axis runs fastest, so that rows belong to the first.
+        for ends, has_values in ((request.across, reached.any(axis=1)), (request.up, reached.any(axis=0))):
+            places = np.flatnonzero(has_values)
             first, last = max(places[0] - MARGIN_POINTS, 0), min(places[-1] + MARGIN_POINTS, points - 1)
             if last - first <= MOSTLY_REACHED * (points - 1) and ends.path not in self._chosen_ranges:
                 step = (ends.high - ends.low) / (points - 1)
@@ -151,18 +154,18 @@ class MapPanel:
     def _deliver(self, request: MapRequest, maps: dict[str, Array] | str) -> None:
         """Show the map that was computed, or the reason why there is none, and how long it took."""
         quantity = str(self.quantity.value)
-        refused = isinstance(maps, str) and request.quantity == quantity
-        if (request.across, request.up) != self._ends() or not (refused or quantity in maps):
-            return  # other axes have been chosen meanwhile, and their map is being computed
-        values = np.full(4, np.nan) if isinstance(maps, str) else maps[quantity]
+        is_refused = isinstance(maps, str) and request.quantity == quantity
+        if (request.across, request.up) != self._ends() or not (is_refused or quantity in maps):
+            return  # other axes or another quantity have been chosen meanwhile, and their map is being computed
+        values = NO_MAP if isinstance(maps, str) else maps[quantity]
         if self._is_first_map and not isinstance(maps, str):
             self._is_first_map = False
             if self._narrow(request, values):
                 self.refresh(request.since)
                 return
         self._show_map(request, values, quantity)
-        took = time.perf_counter() - request.since
-        words = f"{1e3 * took:.0f} ms" if took < 1.0 else f"{took:.1f} s"
+        seconds = time.perf_counter() - request.since
+        words = f"{1e3 * seconds:.0f} ms" if seconds < 1.0 else f"{seconds:.1f} s"
         points = math.isqrt(values.size)
         self.time.set_text(maps if isinstance(maps, str) else f"{points} × {points} poses in {words}")
 
@@ -240,7 +243,7 @@ class MapPanel:
 
     def _choose_axis(self) -> None:
         if self._is_users_choice:
-            self._fit_anew()
+            self._forget_reached()
             self.refresh()
 
     def _pick(self, event: GenericEventArguments) -> None:

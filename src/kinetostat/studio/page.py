@@ -60,9 +60,10 @@ class StudioPage:
             workshop: searches and favourites of the server.
         """
         self.session, self._remember = Session(memory), remember
-        self._pictures = Lane(picture, self._show_picture, self._say_failure, lambda: self.scene.wait())
-        self._reports = Lane(report, self._show_report, self._say_failure)
-        self._latest: Report | None = None
+        self._is_users_choice = False  # whether a change of the list of machines or of the switch is the designer's
+        self._pictures = Lane(picture, self._show_picture, self._show_failure, lambda: self.scene.wait())
+        self._reports = Lane(report, self._show_report, self._show_failure)
+        self._latest: Report | None = None  # the last one with an answer
         self._front: Panel | None = None
         self.dark = ui.dark_mode(value=None)
         self.browser = BrowserLink().on("undo", self._undo).on("redo", self._redo).mark("browser")
@@ -75,7 +76,7 @@ class StudioPage:
             with ui.element("section").classes("text-pane left").props('aria-label="machine file"'):
                 self.text = TextPane(self.session, lambda machine: self._take(machine, typed=True))
             with ui.element("section").classes("middle").props('aria-label="machine"'):
-                self.scene = ScenePanel(self._load, self._exaggerate, lambda: self.session.machine.name)
+                self.scene = ScenePanel(self._show_loaded, self._exaggerate, lambda: self.session.machine.name)
                 self.handles = Handles(self.session, self.scene.view, self.show_change)
                 with self.scene.tools:
                     self.playback = Playback(self.session, self.show_change, self._is_drawing)
@@ -99,7 +100,7 @@ class StudioPage:
             self.undo = icon_button("undo", "Undo (Ctrl+Z)", self._undo, "undo")
             self.redo = icon_button("redo", "Redo (Ctrl+Y)", self._redo, "redo")
             self.reset = icon_button("restart_alt", "Back to the machine as it was loaded", self._reset, "restart_alt")
-            self.mode = toggle([*MODES], EXPLORE, self._to_front, "mode").classes("mode")
+            self.mode = toggle([*MODES], EXPLORE, self._change_mode, "mode").classes("mode")
             ui.space()
             self.upload = upload_field(self._open_upload, refuse, "upload")
             icon_button("folder_open", "Open a machine file", lambda: self.upload.run_method("pickFiles"), "open")
@@ -109,14 +110,14 @@ class StudioPage:
 
     def _views(self) -> None:
         self.panels: dict[str, Panel] = {}
-        made = [panel() for panel in PANELS]
-        for panel in made:
+        panels = [panel() for panel in PANELS]
+        for panel in panels:
             panel.show_change, panel.view, panel.is_busy = self.show_change, self.scene.view, self._is_drawing
-        with ui.tabs(on_change=self._other_front).classes("panel-tabs").props("dense no-caps") as self.tabs:
-            for panel in made:
+        with ui.tabs(on_change=self._change_panel).classes("panel-tabs").props("dense no-caps") as self.tabs:
+            for panel in panels:
                 ui.tab(panel.name).mark(f"tab-{panel.name}")
-        with ui.tab_panels(self.tabs, value=made[0].name, animated=False).classes("panel-body").props("keep-alive"):
-            for panel in made:
+        with ui.tab_panels(self.tabs, value=panels[0].name, animated=False).classes("panel-body").props("keep-alive"):
+            for panel in panels:
                 with ui.tab_panel(panel.name):
                     panel.build()
                 self.panels[panel.name] = panel
@@ -143,9 +144,9 @@ class StudioPage:
         machine = self.session.machine
         names = {name: name for name in bundled()}
         options = names if self.session.name else {OWN_MACHINE: machine.name, **names}
-        self._listening = False
+        self._is_users_choice = False
         self.machines.set_options(options, value=self.session.name or OWN_MACHINE)
-        self._listening = True
+        self._is_users_choice = True
         ui.page_title(f"{machine.name} · kinetostat studio")
         self._sizes = proportions_of(machine, state_of(self.session.origin).configuration)
         self._axes = free_axes(machine)
@@ -161,26 +162,26 @@ class StudioPage:
         self.map.refresh()
         self._pictures.ask(PictureRequest(machine, self._sizes, self._axes, fit=True))
 
-    def _load(self, loaded: bool) -> None:
+    def _show_loaded(self, loaded: bool) -> None:
         """Show the machine under its loads or without them, which is a step of its history."""
-        if self._listening and loaded is not self.session.machine.loaded:
+        if self._is_users_choice and loaded is not self.session.machine.loaded:
             self.session.show_loaded(loaded)
             self.parameters.fill()
             self.show_change()
 
     def _show_state(self) -> None:
         """Bring the switch to the state of the machine."""
-        self._listening = False
+        self._is_users_choice = False
         self.scene.loaded.set_value(self.session.machine.loaded)
-        self._listening = True
+        self._is_users_choice = True
 
     def _offer_history(self) -> None:
         self.undo.set_enabled(self.session.can_undo)
         self.redo.set_enabled(self.session.can_redo)
         self.reset.set_enabled(self.session.machine is not self.session.origin)
-        self._keep()
+        self._remember_state()
 
-    def _keep(self) -> None:
+    def _remember_state(self) -> None:
         """Remember the state of the session, and show it in the address."""
         memory = self.session.memory
         address = address_of(memory)
@@ -195,7 +196,7 @@ class StudioPage:
         self.parameters.take_waiting_position()
         self._report()
 
-    def _say_failure(self, error: Exception) -> None:
+    def _show_failure(self, error: Exception) -> None:
         """Say that the machine could not be drawn or analysed, and let a waiting slider go on."""
         self.scene.fail(error)
         self.parameters.take_waiting_position()
@@ -206,25 +207,26 @@ class StudioPage:
     def _exaggerate(self, factor: float | None) -> None:
         """Draw the deflected shape with another factor; None to choose one."""
         self.session.exaggeration = factor
-        self._keep()
+        self._remember_state()
         self._report()
 
-    def _show_report(self, request: ReportRequest, new: Report) -> None:
-        self.scene.explain(new, request.exaggeration is None)
-        if new.answered:
-            self._latest = new
+    def _show_report(self, request: ReportRequest, latest: Report) -> None:
+        self.scene.explain(latest, request.exaggeration is None)
+        if latest.answered:
+            self._latest = latest
             self._show_front()
         else:
             self._leave_front()
 
-    def _other_front(self) -> None:
+    def _change_panel(self) -> None:
         self._leave_front()
         self._show_front()
 
     def _show_front(self) -> None:
+        """Show the latest answer in the panel in front, if the panel has something to say about it."""
         panel = self.panels.get(str(self.tabs.value))
-        hidden = self.mode.value in (DESIGN, ASK)
-        if self._latest is not None and panel is not None and panel.shows(self._latest) and not hidden:
+        is_hidden = self.mode.value in (DESIGN, ASK)
+        if self._latest is not None and panel is not None and panel.shows(self._latest) and not is_hidden:
             self._front = panel
             panel.show(self._latest, self.session)
 
@@ -234,7 +236,7 @@ class StudioPage:
         self._front = None
 
     def _choose(self) -> None:
-        if self._listening and self.machines.value != OWN_MACHINE:
+        if self._is_users_choice and self.machines.value != OWN_MACHINE:
             name = str(self.machines.value)
             self._attempt(lambda: self.session.open(name))
 
@@ -249,15 +251,16 @@ class StudioPage:
             self._attempt(lambda: self.session.open_bytes(data, name))
         self.upload.reset()
 
-    def _attempt(self, opening: Callable[[], None]) -> None:
+    def _attempt(self, open_machine: Callable[[], None]) -> None:
+        """Open another machine and show it, or say why it is refused."""
         try:
-            opening()
+            open_machine()
         except InputError as error:
             refuse(str(error))
             return
         self._show_machine()
 
-    def _to_front(self) -> None:
+    def _change_mode(self) -> None:
         mode = str(self.mode.value)
         self.main.classes(replace=MODES[mode])
         if mode in (DESIGN, ASK):

@@ -18,16 +18,26 @@ from kinetostat.spec.study import read_study
 
 NICENESS = 10
 """Added to `nice` of such a process, so that the pages get their time first."""
+READING_PROGRAM = "kinetostat.studio.processes"
+"""The module that a reading process runs: this one, by its name."""
+SECONDS_TO_READ = 10
+"""Processor time of the process, s; a usual machine takes one second, nearly all of it to start."""
+SECONDS_TO_WAIT = 60.0
+"""Time, s, after which the process is stopped, on a server with much other work as well."""
+MEMORY_TO_READ = 2 << 30
+"""Address space of the process, bytes; its libraries take half a gigabyte."""
+REFUSED = 3
+"""Exit code after a refusal, whose sentence is on standard output."""
 
 
 class Turns:
-    """A queue in which each tab has at most one work, and only some works are done at a time."""
+    """A queue in which each tab has at most one piece of work, and only some pieces are done at a time."""
 
     def __init__(self, at_a_time: int, refusal: str) -> None:
         """Create an empty queue.
 
         Args:
-            at_a_time: works of all tabs that are done at a time.
+            at_a_time: the most pieces of work of all tabs that are done at a time.
             refusal: the sentence for a tab that has one already.
         """
         self._places, self._refusal = asyncio.Semaphore(at_a_time), refusal
@@ -60,17 +70,8 @@ def make_modest(process: int) -> None:
             os.setpriority(os.PRIO_PROCESS, process, NICENESS)
 
 
-READING_PROGRAM = "kinetostat.studio.processes"
-SECONDS_TO_READ = 10
-"""Processor time of the process, s; a usual machine takes one second, nearly all of it to start."""
-SECONDS_TO_WAIT = 60.0
-"""Time, s, after which the process is stopped, on a server with much other work as well."""
-MEMORY_TO_READ = 2 << 30
-"""Address space of the process, bytes; its libraries take half a gigabyte."""
 READING = Turns(1, "The file that this tab has sent before is still being read; wait for it, then send the next one.")
 """One file of all tabs is read at a time, so that a core is left to the pages."""
-REFUSED = 3
-"""Exit code after a refusal, whose sentence is on standard output."""
 
 
 async def check_upload(kind: str, data: bytes, name: str, tab: Hashable) -> None:
@@ -92,15 +93,15 @@ async def check_upload(kind: str, data: bytes, name: str, tab: Hashable) -> None
         )  # fmt: skip
         make_modest(process.pid)
         try:
-            answer, _ = await asyncio.wait_for(process.communicate(data), SECONDS_TO_WAIT)
+            refusal, _ = await asyncio.wait_for(process.communicate(data), SECONDS_TO_WAIT)
         except TimeoutError:
-            answer = b""
+            refusal = b""
         finally:
             if process.returncode is None:
                 process.kill()
                 await process.wait()
     if process.returncode == REFUSED:
-        raise InputError(answer.decode())
+        raise InputError(refusal.decode())
     if process.returncode != 0:
         raise InputError(
             f'"{name}" takes more than {SECONDS_TO_READ} s or {MEMORY_TO_READ >> 30} GiB to read, or stops the '

@@ -44,6 +44,8 @@ DECIMALS = 9
 """Decimals of metres and radians to which pulled numbers are rounded: finer than anybody can pull."""
 NO_MOTION = 1e-6
 """Singular values below this share of the largest count as zero: motions that no number can make."""
+NOT_GEOMETRY = ("pose.", "tool.", "load.", "limits.", "sections.", *DYNAMIC_FIELDS)
+"""Beginnings of the paths of numbers that do not change where a joint of a leg is."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +53,13 @@ class Handle:
     """A handle of the picture that can be pulled.
 
     Attributes:
-        of: part that is pulled, `PLATFORM`, `BASE` or `HEAD`.
-        leg: name of the leg whose joint it is; of the platform empty.
-        point: base frame, m.
+        kind: `PLATFORM`, `BASE` or `HEAD`.
+        leg: name of the leg whose joint it is; empty for the platform.
+        point: its place, base frame, m.
         axes: those of `MOVES` and `TURNS` along or about which the platform can be pulled; a joint moves in its plate.
     """
 
-    of: str
+    kind: str
     leg: str
     point: Vector
     axes: tuple[str, ...] = ()
@@ -65,7 +67,7 @@ class Handle:
     def as_data(self) -> dict[str, Any]:
         """Convert it to plain data for the browser."""
         point = [float(c) for c in self.point.components()]
-        return {"of": self.of, "leg": self.leg, "point": point, "axes": list(self.axes)}
+        return {"of": self.kind, "leg": self.leg, "point": point, "axes": list(self.axes)}
 
 
 @dataclass(frozen=True)
@@ -74,20 +76,20 @@ class Pull:
 
     Attributes:
         machine: the machine as it is now.
-        of, leg: part and leg of the handle that is pulled.
+        kind, leg: those of the handle that is pulled.
         axis: the axis of a platform's handle, one of `MOVES` or `TURNS`.
         goal: the place where the platform should be; the joint of a leg should be at its translation.
     """
 
     machine: Machine
-    of: str
+    kind: str
     leg: str
     axis: str
     goal: Displacement
 
 
 def handles(configuration: Configuration, axes: tuple[str, ...]) -> list[Handle]:
-    """Return what can be pulled: the platform at P along some axes, and joints of actuated legs but those on rails."""
+    """Return the handles: of the platform at P along some axes, and of joints of actuated legs but those on rails."""
     legs = [part for leg in configuration.legs if (part := anatomy(leg)).actuated]
     joints = [Handle(BASE, leg.leg, leg.foot) for leg in legs if not leg.on_rail]
     joints += [Handle(HEAD, leg.leg, leg.head) for leg in legs]
@@ -122,27 +124,33 @@ def numbers_after_pull(pull: Pull) -> dict[str, float]:
     """
     machine, now = pull.machine, state_of(pull.machine).configuration
     length = float(now.length)
-    if pull.of == PLATFORM:
+    if pull.kind == PLATFORM:
         weights = _weights(pull.axis)
         return _solution_of(
             _Problem(machine, _pose(machine), length, lambda moved: weights * _motion(moved, pull.goal, length))
         )
-    goal, base = pull.goal.translation, pull.of == BASE
+    goal, is_on_base = pull.goal.translation, pull.kind == BASE
     # A joint of the platform is compared in the platform's axes: its place there is geometry, whatever the pose.
-    wanted = goal if base else now.platform.inverse().apply(goal)
+    goal_in_plate = goal if is_on_base else now.platform.inverse().apply(goal)
 
-    def missing(configuration: Configuration) -> Array:
-        leg = next(leg for leg in configuration.legs if leg.name == pull.leg)
-        part = anatomy(leg)
-        point = part.foot if base else configuration.platform.inverse().apply(part.head)
-        return np.array((point - wanted).components(), dtype=float) / length
+    def distance(configuration: Configuration) -> Array:
+        part = anatomy(next(leg for leg in configuration.legs if leg.name == pull.leg))
+        point_in_plate = part.foot if is_on_base else configuration.platform.inverse().apply(part.head)
+        return np.array((point_in_plate - goal_in_plate).components(), dtype=float) / length
 
-    return _solution_of(_Problem(machine, _geometry(machine, pull.leg), length, missing))
+    return _solution_of(_Problem(machine, _geometry(machine, pull.leg), length, distance))
 
 
 @dataclass(frozen=True)
 class _Problem:
-    """Numbers that may change, by path with their kind, and what is to vanish, in units of the machine's length (m)."""
+    """Numbers that may change, and what is to vanish.
+
+    Attributes:
+        machine: the machine as it is before the pull.
+        unknowns: the kind of each number, "length" or "angle", by its leaf path.
+        length: the machine's length, m.
+        residual: what is to vanish at a configuration, in units of that length or rad.
+    """
 
     machine: Machine
     unknowns: dict[str, str]
@@ -150,6 +158,7 @@ class _Problem:
     residual: Callable[[Configuration], Array]
 
     def at(self, numbers: Array) -> Array:
+        """Return the residual of the machine with these numbers, SI; NaN where it is out of reach."""
         changes = dict(zip(self.unknowns, numbers.tolist(), strict=True))
         return self.residual(state_of(with_values(self.machine, changes)).configuration)
 
@@ -175,13 +184,13 @@ def _solution_of(problem: _Problem) -> dict[str, float]:
         effective = effective | slopes.any(axis=0)
         step = units * np.linalg.lstsq(slopes, -residual, rcond=NO_MOTION)[0]
         for _ in range(MOST_HALVINGS):
-            trial = problem.at(numbers + step)
-            if np.isfinite(trial).all() and np.linalg.norm(trial) < np.linalg.norm(residual):
+            new_residual = problem.at(numbers + step)
+            if np.isfinite(new_residual).all() and np.linalg.norm(new_residual) < np.linalg.norm(residual):
                 break
             step = 0.5 * step
         else:
-            break
-        numbers, residual = numbers + step, trial
+            break  # no step leads nearer: the numbers stay where they are
+        numbers, residual = numbers + step, new_residual
     # What has moved less than a residual may be left is round-off: it stays as it was written, to the last digit.
     start = problem.start
     numbers = np.where(np.abs(numbers - start) > SAME_PLACE * units, np.round(numbers, DECIMALS), start)
@@ -209,18 +218,19 @@ def _pose(machine: Machine) -> dict[str, str]:
 
 def _geometry(machine: Machine, leg: str) -> dict[str, str]:
     """Return the lengths and angles of the machine itself; of a machine written leg by leg, those of one leg."""
-    other_tables = ("pose.", "tool.", "load.", "limits.", "sections.", *DYNAMIC_FIELDS)
-    written = machine.family.chains is not None
-    mine = (f"legs.{leg}.", "geometry.")
-    return _fields(machine, lambda path: not path.startswith(other_tables) and (not written or path.startswith(mine)))
+    if machine.family.chains is None:
+        return _fields(machine, lambda path: not path.startswith(NOT_GEOMETRY))
+    tables = (f"legs.{leg}.", "geometry.")
+    return _fields(machine, lambda path: path.startswith(tables) and not path.startswith(NOT_GEOMETRY))
 
 
-def _fields(machine: Machine, chosen: Callable[[str], bool]) -> dict[str, str]:
+def _fields(machine: Machine, is_chosen: Callable[[str], bool]) -> dict[str, str]:
+    """Return the kind of each length or angle whose leaf path is chosen."""
     return {
         leaf: parameter.quantity.kind
         for parameter in parameters(machine.family)
         for leaf in parameter.leaves
-        if parameter.quantity.kind in ("length", "angle") and chosen(leaf)
+        if parameter.quantity.kind in ("length", "angle") and is_chosen(leaf)
     }
 
 

@@ -39,12 +39,15 @@ LAYERS = {
 GHOST = "Keep the present machine as a ghost behind later changes; click again to remove it"
 EXAGGERATION = "factor by which the deflected shape is drawn larger than it is: a number, or auto"
 UNDER_LOAD = "the machine at rest under its weight, preloads and load; gravity is set in the panel Load"
+"""Tooltips of the ghost, of the exaggeration and of the switch for loads."""
 COMPUTING = "The next pose is being computed ..."
 LOOKING = "The legs cannot close at this pose on the branch of the home pose; the nearest pose is being looked for ..."
 KEPT = "The picture and the figures still show the last good pose."
 PICTURED = "The picture shows this pose; the figures still show the last good one."
 UNLOADED = "The picture shows the machine without its loads, and the figures still show the last state of rest."
+"""Sentences about the picture and the figures while the pose has no answer."""
 VIEWS = {"iso": "view from the corner", "front": "front view", "side": "side view", "top": "view from above"}
+"""Views of the camera and their tooltips."""
 
 
 class ScenePanel:
@@ -61,8 +64,8 @@ class ScenePanel:
             name: gives the name of the machine, for saved pictures.
         """
         self._set_loaded, self._exaggerate, self._name = set_loaded, exaggerate, name
-        self._shown: dict[str, Any] | None = None
-        self._ghost = False
+        self._shown_scene: dict[str, Any] | None = None
+        self._has_ghost = False
         self._pictured = False  # the picture shows the present pose, which may have no answer
         self._hidden: set[str] = set()
         with ui.element("div").classes("stage"):
@@ -74,14 +77,14 @@ class ScenePanel:
         with ui.element("div").classes("scene-tools"):
             self.loaded = ui.switch("under load", on_change=lambda event: self._set_loaded(bool(event.value)))
             self.loaded.props("dense").tooltip(UNDER_LOAD).mark("loaded")
-            with ui.element("div").classes("scene-layers") as shown:
+            with ui.element("div").classes("scene-layers") as layer_list:
                 self.layers = {layer: self._layer_box(layer, text) for layer, text in LAYERS.items()}
         with ui.element("div").classes("scene-views") as self.tools:
             for view, text in VIEWS.items():
                 button = ui.button(view, on_click=lambda view=view: self.view.run_method("look", view))
                 button.props("flat dense no-caps").tooltip(text).mark(f"view-{view}")
             # On a narrow page the list would lie on the machine: there this button opens it.
-            layers = icon_button("layers", "Layers of the picture", lambda: shown.classes(toggle="open"), "layers")
+            layers = icon_button("layers", "Layers of the picture", lambda: layer_list.classes(toggle="open"), "layers")
             layers.classes("layers-button")
             self.ghost = icon_button("filter_none", GHOST, self._keep_ghost, "ghost")
             icon_button("photo_camera", "Save the picture as PNG", self._save, "picture")
@@ -113,9 +116,9 @@ class ScenePanel:
 
     def _keep_ghost(self) -> None:
         """Keep the machine as it is as a translucent shape behind those to come, or remove that shape."""
-        solids = [] if self._ghost or self._shown is None else self._shown["solids"]
-        self._ghost = bool(solids)
-        self.ghost.classes(toggle="pressed").props(f'aria-pressed="{str(self._ghost).lower()}"')
+        solids = [] if self._has_ghost or self._shown_scene is None else self._shown_scene["solids"]
+        self._has_ghost = bool(solids)
+        self.ghost.classes(toggle="pressed").props(f'aria-pressed="{str(self._has_ghost).lower()}"')
         self.view.run_method("ghost", [{**s, "material": "removed"} for s in solids if s["layer"] == "machine"])
 
     def _save(self) -> None:
@@ -125,7 +128,7 @@ class ScenePanel:
         """Show a pose, if there is something to draw."""
         self._pictured = picture.scene is not None
         if picture.scene is not None:
-            self._shown = picture.scene
+            self._shown_scene = picture.scene
             self.view.show(picture.scene)
 
     def explain(self, report: Report, automatic: bool) -> None:
@@ -136,12 +139,11 @@ class ScenePanel:
             automatic: whether the page chose the factor of the deflected shape.
         """
         status, message = _verdict(report)
-        sound = report.loaded is None or report.loaded.rest is Rest.OK
-        placed = report.analysis.status is Status.OK
-        kept = UNLOADED if placed else PICTURED if self._pictured else KEPT
-        self._show_verdict(report.answered, status, message, sound, kept)
+        is_sound = report.loaded is None or report.loaded.rest is Rest.OK
+        is_placed = report.analysis.status is Status.OK
+        self._show_verdict(report.answered, status, message, is_sound, self._kept_sentence(is_placed))
         if not report.answered:
-            if placed or self._pictured:
+            if is_placed or self._pictured:
                 self.view.run_method("overlay", [], [])
             return
         self.view.run_method("overlay", report.solids, [])
@@ -150,6 +152,12 @@ class ScenePanel:
         if report.exaggeration is not None:
             self.scale.show_value(factor_text(report.exaggeration, automatic), factor_position(report.exaggeration))
         self.figures.set_content(headline(report))
+
+    def _kept_sentence(self, is_placed: bool) -> str:
+        """Return the sentence on what the page still shows of a pose without an answer."""
+        if is_placed:
+            return UNLOADED
+        return PICTURED if self._pictured else KEPT
 
     def wait(self) -> None:
         """Say that a pose takes its time; its picture, or the reason why it has none, follows."""
@@ -163,19 +171,21 @@ class ScenePanel:
         """Say that the machine could not be drawn or analysed because of a mistake of the program."""
         self._show_verdict(False, "no answer", as_sentence(error))
 
-    def _show_verdict(self, answered: bool, status: str, message: str, sound: bool = True, kept: str = KEPT) -> None:
+    def _show_verdict(
+        self, answered: bool, status: str, message: str, is_sound: bool = True, kept_sentence: str = KEPT
+    ) -> None:
         """Show the status of the pose and a message in the line below the picture.
 
         Args:
             answered: whether the pose has an answer.
             status: a word or two.
             message: sentences.
-            sound: whether the answer is free of faults; otherwise the line is drawn as a refusal.
-            kept: a sentence on what the page still shows if there is no answer.
+            is_sound: whether the answer is free of faults; otherwise the line is drawn as a refusal.
+            kept_sentence: what the page still shows if there is no answer.
         """
-        self.line.classes(replace="pose-line" if answered and sound else "pose-line refused")
+        self.line.classes(replace="pose-line" if answered and is_sound else "pose-line refused")
         self.status.set_text(status)
-        self.message.set_text(message if answered else f"{message} {kept}")
+        self.message.set_text(message if answered else f"{message} {kept_sentence}")
 
 
 def _verdict(report: Report) -> tuple[str, str]:
@@ -223,8 +233,7 @@ def _tile(name: str, value: str, unit: str) -> str:
 
 
 class Handles:
-    """Follows the handles of a view while they are pulled; the latest wish counts, those in between are not
-    computed."""
+    """Follows the handles of a view while they are pulled; of the positions of the pointer, only the latest counts."""
 
     def __init__(self, session: Session, view: Element, on_change: Callable[[], None]) -> None:
         """Listen.
@@ -237,8 +246,8 @@ class Handles:
         self._session, self._on_change = session, on_change
         self._lane = Lane(numbers_after_pull, self._follow)
         self._pull_number: object = None
-        self._home: Displacement | None = None
-        self._has_ended = False  # the handle was let go, while a wish may still be computed
+        self._home: Displacement | None = None  # the place of the platform when this pull began
+        self._has_ended = False  # the handle was let go, while a position may still be computed
         view.on("pull", self._ask, throttle=THROTTLE)
         view.on("settle", self._settle)
 
@@ -247,13 +256,14 @@ class Handles:
         self._lane.close()
 
     def _ask(self, event: GenericEventArguments) -> None:
-        part, leg, axis, goal, number = (event.args[key] for key in ("of", "leg", "axis", "goal", "start"))
+        """Follow a position of the pointer, in m or rad from where the pull began, or as a point in m for a joint."""
+        kind, leg, axis, goal, number = (event.args[key] for key in ("of", "leg", "axis", "goal", "start"))
         machine = self._session.machine
         if self._home is None or number != self._pull_number:
             self._pull_number, self._home = number, state_of(machine).configuration.platform
         self._has_ended = False
-        target = goal_of(self._home, axis, float(goal)) if part == PLATFORM else point_goal([float(c) for c in goal])
-        self._lane.ask(Pull(machine, part, leg, axis, target))
+        target = goal_of(self._home, axis, float(goal)) if kind == PLATFORM else point_goal([float(c) for c in goal])
+        self._lane.ask(Pull(machine, kind, leg, axis, target))
 
     def _follow(self, _pull: Pull, numbers: dict[str, float]) -> None:
         if numbers:

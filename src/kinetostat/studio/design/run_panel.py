@@ -258,7 +258,7 @@ class FrontPanel:
         self._pick = pick
         self._progress: SearchState | None = None
         self._chosen: int | None = None
-        self._is_ready = False  # whether the choices are complete, so that a change of one is that of a designer
+        self._is_users_choice = False  # whether a change of an axis is the designer's; those of `_offer` are not
         with ui.element("div").classes("front-plot") as self.plot:
             with ui.row().classes("panel-tools") as self.tools:
                 self.across = choice({}, "horizontal axis", self._change_axis, "front-across")
@@ -290,15 +290,15 @@ class FrontPanel:
 
     def _offer(self, names: dict[int, str]) -> None:
         """Offer the objectives as axes and colour; with only two, the choice is hidden."""
-        self._is_ready = False
+        self._is_users_choice = False
         self.tools.set_visibility(len(names) > 2)
         self.across.set_options(names, value=0)
         self.up.set_options(names, value=1)
         self.coloured.set_options({NO_COLOUR: "none", **names}, value=2 if len(names) > 2 else NO_COLOUR)
-        self._is_ready = True
+        self._is_users_choice = True
 
     def _change_axis(self) -> None:
-        if self._is_ready:
+        if self._is_users_choice:
             self._draw()
 
     def _draw(self) -> None:

@@ -64,7 +64,7 @@ class StudyForm:
         """
         self._session, self._start = session, start
         self.draft = self._new_draft()
-        self._offering = False  # while it is set, a change in the list of studies is not a choice of the designer
+        self._is_users_choice = False  # whether a change in the list of studies is the designer's
         with ui.element("div").classes("design-head"):
             self.source = choice({}, "study", self._choose, "study-source").classes("grow")
             icon_button("upload_file", "Open a study file", lambda: self.upload.run_method("pickFiles"), "study-open")
@@ -98,13 +98,13 @@ class StudyForm:
 
     def _offer_studies(self, source: str) -> None:
         """List the studies to choose from; `source` is the one in the form."""
-        self._offering = True
+        self._is_users_choice = False
         studies = {NEW: "new study of this machine", **{name: name for name in bundled_studies()}}
         self.source.set_options(studies | ({SENT: self.draft.name} if source == SENT else {}), value=source)
-        self._offering = False
+        self._is_users_choice = True
 
     def _choose(self) -> None:
-        if not self._offering and self.source.value != SENT:
+        if self._is_users_choice and self.source.value != SENT:
             name = str(self.source.value)
             self._show(self._new_draft() if name == NEW else bundled_draft(name), name)
 
