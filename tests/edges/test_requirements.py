@@ -98,6 +98,7 @@ def test_commands_say_it_and_end_with_1(tmp_path, capsys):
         ('a = "free_stiffness_z > 3 kg"', '"kg" is not a unit of linear stiffness'),
         ('a = { demand = "free_stiffness_z > 3", over = ["q=1:2:3"] }', r'requirements\.a: "q" is not a field'),
         ('a = { demand = "free_stiffness_z > 3", poses = [{ x = "1 kg" }] }', r"poses\.0\.x is .*not a unit of length"),
+        ('a = { demand = "free_stiffness_z > 3", poses = [{ x = 0, "pose.x" = 1 }] }', r"poses\.0 gives pose\.x twice"),
         ('a = { demand = "free_stiffness_z > 3", over = ["x=0:1:2"], poses = [{ x = 0 }] }', "both over and poses"),
     ],
 )

@@ -90,6 +90,7 @@ MISTAKES = {
     'poses.over=["x=0:1"]': "is not a range",
     'poses.over=["platform_radius=10 cm:14 cm:3"]': "is a variable and varies over the poses too",
     'poses.list=[{x="5 kg"}]': r"poses\.list\.0\.x",
+    'poses.list=[{x=0, "pose.x"=1}]': r"poses\.list\.0 gives pose\.x twice",
     'poses.within="workspace"': "belong to a grid",
     "poses.required=2": "less than or equal to 1",
     "optimizer.method=ga": "optimizer.method",

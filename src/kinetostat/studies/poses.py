@@ -5,7 +5,8 @@ pandas, polars and xarray are read by what they can do, so that none of these li
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -92,10 +93,8 @@ def read_columns(
         raise InputError("poses has no columns; name the field that each column holds, e.g. x.")
     columns = _with_angles(machine, columns, where)
     fields = [_field_of_column(machine, column.name) for column in columns]
-    leaves = [leaf for field in fields for leaf in field.leaves]
-    for leaf in leaves:
-        if leaves.count(leaf) > 1:
-            raise InputError(f"{leaf} is given by two columns of the poses; remove one of them.")
+    if leaf := repeated_leaf(fields):
+        raise InputError(f"{leaf} is given by two columns of the poses; remove one of them.")
     pairs = list(zip(columns, fields, strict=True))
     values = [column_values(column, field.quantity, where) for column, field in pairs]
     lengths = dict.fromkeys(len(array) for array in values)
@@ -314,6 +313,24 @@ def _greatest_plausible(machine: Machine, kind: str, greatest: float) -> float:
     return MOST_MACHINE_LENGTHS * float(MachineState(machine).configuration.length) if greatest > 1.0 else math.inf
 
 
+def repeated_leaf(fields: Iterable[Parameter]) -> str:
+    """Return the path of the first number of a machine that several fields set; empty if each has one of its own."""
+    counts = Counter(leaf for field in fields for leaf in field.leaves)
+    return next((leaf for leaf, count in counts.items() if count > 1), "")
+
+
+def listed_fields(machine: Machine, names: Iterable[str], where: str) -> dict[str, Parameter]:
+    """Find the fields that a pose of a list gives, by their names; `where` says in messages which pose it is.
+
+    Raises:
+        InputError: there is no such field, or two of them set one number.
+    """
+    fields = {name: find(machine.family, name) for name in names}
+    if leaf := repeated_leaf(fields.values()):
+        raise InputError(f"{where} gives {leaf} twice; remove one of them.")
+    return fields
+
+
 def chosen_axes(machine: Machine, ranges: Sequence[str]) -> list[tuple[Range, Parameter]]:
     """Read the axes of a grid: ranges as written, and the parameters that they are about.
 
@@ -328,10 +345,8 @@ def chosen_axes(machine: Machine, ranges: Sequence[str]) -> list[tuple[Range, Pa
         )
     spans = [parse_range(text) for text in ranges]
     chosen = [find(machine.family, span.field) for span in spans]
-    leaves = [leaf for parameter in chosen for leaf in parameter.leaves]
-    for leaf in leaves:
-        if leaves.count(leaf) > 1:
-            raise InputError(f"{leaf} is varied twice; give each field one range.")
+    if leaf := repeated_leaf(chosen):
+        raise InputError(f"{leaf} is varied twice; give each field one range.")
     return list(zip(spans, chosen, strict=True))
 
 

@@ -20,7 +20,7 @@ from kinetostat.kinematics.status import Status
 from kinetostat.kinetostatics.quantities import QUANTITIES, needs_state
 from kinetostat.late import LateModule
 from kinetostat.machine.machine import Machine
-from kinetostat.machine.parameters import Parameter, find, shown, values
+from kinetostat.machine.parameters import Parameter, shown, values
 from kinetostat.spec.arguments import checked
 from kinetostat.spec.document import parse
 from kinetostat.spec.errors import InputError, choice
@@ -28,7 +28,7 @@ from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.requirements import Requirement
 from kinetostat.studies.csv_columns import GivenColumn
 from kinetostat.studies.evaluation import point_of_file
-from kinetostat.studies.poses import chosen_axes, grid_of, read_columns
+from kinetostat.studies.poses import chosen_axes, grid_of, listed_fields, read_columns
 from kinetostat.studies.quantities import PoseCondition, parse_condition, refuse_absent
 
 if TYPE_CHECKING:
@@ -298,12 +298,13 @@ def _poses_of_box(machine: Machine, over: Sequence[str]) -> _Poses:
 
 def _poses_of_list(machine: Machine, poses: Sequence[Mapping[str, Any]]) -> _Poses:
     """The poses of a list; coordinates that one does not name are those of the file."""
-    of_file = values(machine)
-    paths = {name: find(machine.family, name).path for row in poses for name in row}
-    rows = [{paths[name]: value for name, value in row.items()} for row in poses]
+    of_file, rows = values(machine), []
+    for number, pose in enumerate(poses):
+        fields = listed_fields(machine, pose, f"poses.{number}")
+        rows.append({field.path: pose[name] for name, field in fields.items()})
     columns = [
         GivenColumn(path, np.array([row.get(path, float(of_file[path])) for row in rows], object))
-        for path in dict.fromkeys(paths.values())
+        for path in dict.fromkeys(path for row in rows for path in row)
     ]
     read = read_columns(machine, columns, lambda path, i: f"poses.{i}.{shown(path)}")
     return _Poses(PointTable(read.leaves), list(read.fields), "of the list")

@@ -22,6 +22,7 @@ from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity
 from kinetostat.spec.immutable import Immutable
 from kinetostat.spec.study import PosesTable, VariableTable
+from kinetostat.studies.poses import listed_fields, repeated_leaf
 from kinetostat.units import KINDS, RIGID, UnitError, parse
 
 if TYPE_CHECKING:
@@ -174,10 +175,8 @@ def read_space(machine: Machine, tables: Sequence[VariableTable]) -> Space:
         InputError: a field is not known or set twice, does not allow a bound, or no variable is left to search.
     """
     variables = tuple(_variable(machine, table, f"variables.{i}") for i, table in enumerate(tables))
-    leaves = [leaf for variable in variables for field in variable.fields for leaf in field.leaves]
-    for leaf in leaves:
-        if leaves.count(leaf) > 1:
-            raise InputError(f"{leaf} is set by two variables; give each field to one.")
+    if leaf := repeated_leaf(field for variable in variables for field in variable.fields):
+        raise InputError(f"{leaf} is set by two variables; give each field to one.")
     if all(variable.fixed for variable in variables):
         raise InputError("all variables are fixed; leave at least one free to be searched.")
     return Space(variables)
@@ -339,11 +338,11 @@ def _list_columns(machine: Machine, rows: Sequence[Mapping[str, float | str]]) -
 
 
 def _row(machine: Machine, row: Mapping[str, float | str], where: str) -> dict[str, float]:
-    row_values = {}
-    for name, written in row.items():
-        field = find(machine.family, name)
-        row_values.update(dict.fromkeys(field.leaves, _value(written, field.quantity, f"{where}.{name}")))
-    return row_values
+    """A pose of a list by leaf path, SI."""
+    values_of_row = {}
+    for name, field in listed_fields(machine, row, where).items():
+        values_of_row |= dict.fromkeys(field.leaves, _value(row[name], field.quantity, f"{where}.{name}"))
+    return values_of_row
 
 
 def _grid(machine: Machine, table: PosesTable) -> PoseSet:
