@@ -131,7 +131,7 @@ USUAL = {
 }
 """SI values of the units that most files use, by SI unit. They are pint's to the last bit, which a test compares; pint
 itself takes longer to import than a thousand poses take to compute, and is only asked about all other units."""
-TURNS_COUNT = ("angle", "rate", "frequency", "angular acceleration")
+KINDS_WITH_ANGLE = ("angle", "rate", "frequency", "angular acceleration")
 """Kinds whose angle cannot be left out: 1 Hz is 2 pi rad/s. Others may be written without theirs, a torsional stiffness
 in N*m; but none is written with an angle that it has not: a lead of "10 mm/turn" is not a length of 10 mm / (2 pi)."""
 WITHOUT_ANGLE = {"rate": "1/s", "angular acceleration": "1/s**2"}
@@ -343,7 +343,7 @@ def _in_root_units(unit: str) -> "PlainQuantity[float] | None":
 def _factor(unit: str, wanted: Kind) -> float:
     """Return the SI value of one `unit` of this kind.
 
-    Angles are no dimension to pint, so that their powers are compared apart: see `TURNS_COUNT`.
+    Angles are no dimension to pint, so that their powers are compared apart: see `KINDS_WITH_ANGLE`.
     """
     if UNIT.fullmatch(unit) is None:
         raise UnitError(f'"{unit}" is not a unit; write {_allowed_form(wanted)}')
@@ -355,7 +355,7 @@ def _factor(unit: str, wanted: Kind) -> float:
     if written is None or target is None:
         raise UnitError(f'the unit "{unit}" is unknown; write {_allowed_form(wanted)}')
     power, wanted_power = (dict(quantity.unit_items()).get("radian", 0) for quantity in (written, target))
-    misread = power != wanted_power and (power or wanted.name in TURNS_COUNT)
+    misread = power != wanted_power and (power or wanted.name in KINDS_WITH_ANGLE)
     if written.dimensionality != target.dimensionality or misread:
         raise UnitError(f'"{unit}" is not a unit of {wanted.name}; write {_allowed_form(wanted)}')
     return float(written.magnitude / target.magnitude)

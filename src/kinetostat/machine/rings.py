@@ -276,9 +276,10 @@ def with_struts_or_cranks(
 
 
 def _crank_tables(geometry: type, stiffness: type) -> dict[str, type]:
+    """The tables [geometry] and [stiffness] of cranks, from those of struts."""
     count = quantities(stiffness)["actuator"].count
     turn = Quantity("angle", "turn of each crank's plane about z, from the radial direction", count=count, per_leg=True)
-    changed = {
+    rigidities = {
         "actuator": Field(
             Quantity("torsional stiffness", "stiffness of the actuated revolutes", count=count, per_leg=True)
         ),
@@ -288,5 +289,5 @@ def _crank_tables(geometry: type, stiffness: type) -> dict[str, type]:
     turns = {"crank_turn": Field(turn, (0.0,) * (count or 1))}
     return {
         "geometry": made_table("Geometry", turns, (geometry, Cranks)),
-        "stiffness": made_table("Stiffness", changed, (stiffness,)),
+        "stiffness": made_table("Stiffness", rigidities, (stiffness,)),
     }

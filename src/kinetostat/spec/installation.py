@@ -1,7 +1,8 @@
 """The installation at hand: how `kinetostat` is typed in it, and the commands that install what is missing.
 
 No package index has kinetostat, so a hint must not say `pip install kinetostat`. There are three cases: a clone whose
-environment uv keeps (`uv sync` installs into it), any other environment with pip, and one made by uv without pip.
+environment uv keeps (`uv sync` installs into it), any other environment with pip, and one made by uv without pip. What
+is asked of installed packages is imported where it is asked: most messages need none of it.
 """
 
 import os

@@ -18,6 +18,7 @@ from kinetostat.spec.errors import PRINTABLE, InputError, shorten
 from kinetostat.units import UnitError, parse
 
 MM, UM, MINUTE = 1e-3, 1e-6, math.pi / 180.0 / 60.0
+"""Units of the standards in SI: m, m and rad."""
 
 SIZES = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500, 630, 800, 1000, 1250, 1600, 2000, 2500, 3150)
 """Upper ends of the ranges of nominal sizes, mm. Source: ISO 286-1:2010, table 1."""
@@ -95,6 +96,7 @@ def _range_of(size: float, ends: Sequence[float], name: str) -> int:
 
 
 TABLE = "tolerances"
+"""Name of the table in files."""
 MOST_LINES = 200
 """Lines of the table at most: one for each number of a large machine, so that more are a mistake."""
 MOST_DEVIATIONS = 3
@@ -104,6 +106,7 @@ LINE_WIDTH = 120
 SIGMAS = 3.0
 """Standard deviations that a plus-minus stands for, where a number is normally distributed: 99.7 % lie within three."""
 UNIFORM, NORMAL = "uniform", "normal"
+"""Distributions of a number about its nominal value: evenly between its limits, or as a bell curve."""
 LARGEST_TOLERANCE = {"length": 1.0, "angle": 0.5, "share": 0.5}
 """The largest tolerance of each kind, SI: beyond it errors are not small, and nothing here would hold."""
 COSTS = (1e-6, 1e6)
@@ -111,11 +114,13 @@ COSTS = (1e-6, 1e6)
 LARGEST_SIZE = 1e3
 """The largest nominal size that may be written with a class, m: the tables of the standards end far below."""
 LINE_KEYS = ("tolerance", "cost")
+"""Keys of a line that is a table."""
 TOLERANCE_FORM = (
     'write for example joints = "0.05 mm" (plus and minus), ["0.05 mm", "0.02 deg"] (lengths and angles), "sigma '
     '0.02 mm" (a standard deviation), "0.05 mm normal" (three of them), "IT7 at 300 mm" or "ISO 2768-m at 300 mm" '
     "(a class)"
 )
+"""End of the messages on what is not a tolerance."""
 
 _SIGNS = re.compile(r"^(?:±|\+\s*/?\s*-)\s*")
 _GRADE = re.compile(r"(?:ISO\s*286[\s:-]*)?IT\s*(\d{1,2})", re.IGNORECASE)

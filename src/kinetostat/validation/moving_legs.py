@@ -122,10 +122,11 @@ class LegBody:
         """
         first, last = self.parts
         before, after = placements[first], placements[last]
-        ends = (first, point_at(before, vector(self.ends[0]))), (last, point_at(after, vector(self.ends[1])))
+        start, end = (vector(point) for point in self.ends)
+        ends = Station(first, point_at(before, start)), Station(last, point_at(after, end))
         centre: Station | None = None
         if self.centre is not None:
-            centre = first, point_at(before, vector(self.centre))
+            centre = Station(first, point_at(before, vector(self.centre)))
         tensor = None
         if self.inertia is not None:
             tensor = tensor_of(before[:3, :3] @ self.inertia @ before[:3, :3].T)

@@ -384,7 +384,7 @@ def rotor_inertia(machine: Machine, spring: Spring) -> float:
     return float(drives.rotor_inertia) * turns**2
 
 
-def _stations(link: Member) -> tuple[tuple[int, Vector], ...]:
+def _stations(link: Member) -> tuple[Station, ...]:
     if link.centre is not None:
         return (link.centre(),)
     return () if link.ends is None else link.ends()

@@ -22,25 +22,26 @@ PACKAGE = __name__.partition(".")[0]
 ENTRY_POINTS = "kinetostat.families"
 """The group in which an installed package names its families, so that the command line knows them as well."""
 
-HOMES = {"orthoglide": "delta", "tricept": "passive_leg"}
-"""Modules of families that are not named after them, by the beginning of their names, so that no other is imported."""
+OTHER_MODULES = {"orthoglide": "delta", "tricept": "passive_leg"}
+"""Modules by the beginnings of family names that are not theirs, so that to look such a name up imports one module."""
 
 _REGISTERED: dict[str, Family] = {}
 
 
 def families() -> dict[str, Family]:
     """Return every family by name, in alphabetical order."""
-    return dict(sorted({**_of_this_package(), **_REGISTERED}.items()))
+    return dict(sorted({**_families_of_package(), **_REGISTERED}.items()))
 
 
 def family_named(name: str) -> Family | None:
     """Return the family of a name, or None if there is none; of this package, only its own module is imported.
 
-    A module's name begins the names of its families, with few exceptions (`HOMES`). If no module's does, all are looked
-    through, and then those that installed packages register.
+    A module's name begins the names of its families, with few exceptions (`OTHER_MODULES`). If no module's does, all
+    are looked through, and then those that installed packages register.
     """
-    home = next((home for beginning, home in HOMES.items() if name.startswith(beginning)), name.replace("-", "_"))
-    for module in sorted(_modules(), key=lambda module: not home.startswith(module)):
+    other = next((module for beginning, module in OTHER_MODULES.items() if name.startswith(beginning)), "")
+    wanted = other or name.replace("-", "_")
+    for module in sorted(_modules(), key=lambda module: not wanted.startswith(module)):
         if name in _families_in(module):
             return _families_in(module)[name]
     if name not in _REGISTERED:
@@ -48,7 +49,7 @@ def family_named(name: str) -> Family | None:
     return _REGISTERED.get(name)
 
 
-def _of_this_package() -> dict[str, Family]:
+def _families_of_package() -> dict[str, Family]:
     return {name: family for module in _modules() for name, family in _families_in(module).items()}
 
 
@@ -79,7 +80,7 @@ def register(family: Family) -> Family:
     Raises:
         InputError: it is not a family, or kinetostat itself has one of that name.
     """
-    if family.name in {*_of_this_package(), NAME}:
+    if family.name in {*_families_of_package(), NAME}:
         raise InputError(f'family "{family.name}" belongs to kinetostat; choose another name.')
     _REGISTERED[family.name] = family
     return family

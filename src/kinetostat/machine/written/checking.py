@@ -17,7 +17,7 @@ from kinetostat.machine.leg import Joint, rows_about_one_point
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.machine import Inverse, Plane, Step
 from kinetostat.machine.written.ball_leg import ball_leg
-from kinetostat.machine.written.family import chains, place
+from kinetostat.machine.written.family import chains, placed_chain
 from kinetostat.machine.written.joints import JOINT_TYPES, departure
 from kinetostat.machine.written.parallel_axes import parallel_axes
 from kinetostat.machine.written.plan import BASE, PLATFORM, JointPlan, LegPlan, LinkPlan, Matrix, Plan
@@ -115,7 +115,7 @@ def complete_plan(plan: Plan, tables: Mapping[str, Any]) -> Plan:
     amounts = iter(np.random.default_rng(1).uniform(-RANDOM_AMOUNT, RANDOM_AMOUNT, home.size).tolist())
     legs = []
     for leg, steps in zip(plan.legs, home.legs, strict=True):
-        placed, _ = place(steps, amounts)
+        placed, _ = placed_chain(steps, amounts)
         freedoms = [joint for element in placed for joint in element.freedoms]
         idle = _dependent_freedoms(freedoms, plan.planar, home.home.translation, float(home.length))
         centred = rows_about_one_point([_centre(joint) for joint in freedoms])

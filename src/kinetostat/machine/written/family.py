@@ -95,7 +95,7 @@ def configure(plan: Plan, joints: Sequence[Scalar | Turn], **tables: Any) -> Con
     """
     home = chains(plan, **tables)
     coordinates = iter(joints)
-    placed = [place(steps, coordinates) for steps in home.legs]
+    placed = [placed_chain(steps, coordinates) for steps in home.legs]
     legs = tuple(
         Leg(leg.name, with_rods(steps, elements), idle=leg.idle, centred=leg.centred)
         for leg, steps, (elements, _) in zip(plan.legs, home.legs, placed, strict=True)
@@ -117,7 +117,7 @@ def chains(plan: Plan, **tables: Any) -> Chains:
     )
 
 
-def place(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[list[Element], Displacement]:
+def placed_chain(steps: Sequence[Step], coordinates: Iterator[Scalar | Turn]) -> tuple[list[Element], Displacement]:
     """A chain at given coordinates, and the displacement of its platform end from the home pose.
 
     Revolutes are turned in their axes at the home pose, which are often those of the base, so that traced products are
@@ -195,8 +195,8 @@ def _moving(leg: LegPlan, joint: JointPlan, data: Any, plan: Plan, tables: Mappi
     steps = [Step(element, True) for element in elements]
     if not joint.sprung:
         return steps
-    place = motor.place if motor else 0
-    freedom = cast(Joint, elements[place])  # only a joint can be sprung: a parallelogram has no motor
+    driven = motor.place if motor else 0
+    freedom = cast(Joint, elements[driven])  # only a joint can be sprung: a parallelogram has no motor
     name = f"{title} actuator" if joint.actuated else f"{title} hinge"
     stiffness = 0.0 if joint.series else data.stiffness
     spring = Spring(
@@ -217,7 +217,8 @@ def _moving(leg: LegPlan, joint: JointPlan, data: Any, plan: Plan, tables: Mappi
         whole = reduce(series, [each.stiffness for each in row])
         row = [replace(each, return_stiffness=whole) for each in row]
     rods = [rod_of(leg.name, joint, row[0], data, plan, tables)] if joint.rod else []
-    return [*steps[:place], *(Step(part, i == 0) for i, part in enumerate([*row, *rods])), *steps[place + 1 :]]
+    sprung = [Step(part, i == 0) for i, part in enumerate([*row, *rods])]
+    return [*steps[:driven], *sprung, *steps[driven + 1 :]]
 
 
 def _link_elements(
@@ -250,6 +251,7 @@ def members(plan: Plan, joints: Sequence[Scalar | Turn] | None = None, **tables:
         data = [joint_numbers(leg, joint, tables) for joint in leg.joints]
         carriers = [None] * len(data) if coordinates is None else _carriers(plan, leg, tables, coordinates)
         can_move = False
+        # A link follows every joint but the last one, behind which is the platform.
         for joint, near, far, carrier in zip(leg.joints, data, data[1:], carriers, strict=False):
             can_move = can_move or joint.kind != "fixed"
             if can_move:
@@ -273,7 +275,7 @@ def _carriers(
     motion, carried = Displacement(IDENTITY, ZERO), 0
     carriers: list[Carrier | None] = []
     for moving, flexible in _parts_at_home(plan, leg, tables):
-        motion = place([replace(s, element=s.element.displaced(motion)) for s in moving], joints)[1] @ motion
+        motion = placed_chain([replace(s, element=s.element.displaced(motion)) for s in moving], joints)[1] @ motion
         carried += len(moving) + len(flexible)
         carriers.append(Carrier(motion, carried - len(flexible), carried))
     return carriers

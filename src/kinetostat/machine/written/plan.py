@@ -267,8 +267,8 @@ def placements(copies: Copies, where: str) -> list[CopyPlacement]:
     Raises:
         InputError: an entry of angles is not an angle; names the leg.
     """
-    turns = copies.count // 2 if copies.mirrored else copies.count
-    angles = [_angle(angle, where) for angle in copies.angles] or [2.0 * math.pi * i / turns for i in range(turns)]
+    steps = copies.count // 2 if copies.mirrored else copies.count
+    angles = [_angle(angle, where) for angle in copies.angles] or [2.0 * math.pi * i / steps for i in range(steps)]
     images = (False, True) if copies.mirrored else (False,)
     return [
         CopyPlacement(_without_round_off(math.cos(a)), _without_round_off(math.sin(a)), image)
@@ -285,6 +285,7 @@ def _angle(angle: object, where: str) -> float:
 
 
 def _without_round_off(number: float) -> float:
+    """Return a cosine or sine, exact if it is 0, 1/2 or 1 up to round-off, so that products with it are sparse."""
     simple = round(2.0 * number) / 2.0
     return simple if abs(number - simple) < SIMPLE_COSINE else number
 
@@ -350,7 +351,7 @@ def direction_in(leg: LegPlan, direction: Sequence[float]) -> Vector:
 
 
 def inertia_in(leg: LegPlan, tensor: Sequence[Scalar]) -> tuple[Scalar, ...]:
-    """An inertia tensor that is written for a leg, in the axes of this leg; a mirror image is turned likewise."""
+    """An inertia tensor that is written for a leg, in the axes of this leg, which may be a mirror image."""
     return tuple(tensor) if leg.placement is None else turned_tensor(leg.placement.vector, tensor)
 
 
