@@ -141,7 +141,7 @@ def leg_ends(chains: Chains, coordinates: Sequence[Scalar]) -> list[LegEnd]:
 
 def leg_end(steps: Sequence[Step], home: Displacement, coordinates: Iterator[Scalar | Turn]) -> LegEnd:
     """Follow one leg from base to platform, and take its coordinates, rad (or turns) or m from the home pose."""
-    chain, motion = family.place([step for step in steps if step.moves], coordinates)
+    chain, motion = family.placed_chain([step for step in steps if step.moves], coordinates)
     return LegEnd(motion @ home, tuple(element.mover for element in chain))  # type: ignore[attr-defined]
 
 
