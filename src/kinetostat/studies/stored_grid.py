@@ -302,7 +302,7 @@ class _QuantityTally(TypedDict):
 
 
 class _ChunkTally(TypedDict):
-    """What the note about a chunk says of its numbers: points by the word of their status, and each quantity."""
+    """The numbers in the note about a chunk: counts of points by the word of their status, and each quantity."""
 
     status: dict[str, int]
     quantities: dict[str, _QuantityTally]
