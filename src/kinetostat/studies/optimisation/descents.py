@@ -129,7 +129,7 @@ class _Descent:
         scale = abs(self._objective(first)[0]) or 1.0
         kinked = self._kinked_term if first.reached.size > 1 else None
         if kinked is None:
-            self._minimise(genes, scale)
+            self._at(self._minimise(genes, scale))  # so that the design where the descent ends is among those tried
             return
         value = np.inf
         for _ in range(MOST_ROUNDS):

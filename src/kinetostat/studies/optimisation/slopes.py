@@ -116,7 +116,8 @@ class Surveyor:
             problem: the problem.
             searching: whether many designs will be evaluated for certain.
         """
-        self.problem, self._evaluations = problem, COMPILE_FROM if searching else 0
+        self.problem = problem
+        self._evaluations = COMPILE_FROM if searching else 0  # counted as if so many had been made by NumPy
         self._free = np.flatnonzero(problem.space.catalogue == 0)
         self._leaf_rates = self._rates_of_leaves()
         self._leaves = list(dict.fromkeys(leaf for rates in self._leaf_rates for leaf in rates))
@@ -158,8 +159,9 @@ class Surveyor:
         with np.errstate(invalid="ignore"):
             for name, rows in zip(problem.names, answers.slopes if answers.slopes is not None else (), strict=True):
                 by_leaf = dict(zip(self._leaves, rows, strict=True))
-                parts = [sum(rate * by_leaf[leaf] for leaf, rate in rates.items()) for rates in self._leaf_rates]
-                slopes[name] = np.array(parts)
+                slopes[name] = np.array(
+                    [sum(rate * by_leaf[leaf] for leaf, rate in rates.items()) for rates in self._leaf_rates]
+                )
         reached = answers.status == Status.OK
         return [
             SurveyedDesign(
