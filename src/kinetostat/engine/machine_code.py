@@ -137,7 +137,8 @@ def host_features() -> tuple[str, ...]:
 
 SECTION_TABLE, SECTION_SIZE_AND_COUNT = 40, 58
 """Places in the header of an object file: where its table of sections begins, and how many there are of which size."""
-SECTION, SYMBOL, RELOCATION = struct.Struct("<IIQQQQIIQQ"), struct.Struct("<IBBHQQ"), struct.Struct("<QQq")
+SECTION, SYMBOL, RELOCATION = struct.Struct("<4xIQ8xQQ4xIQ8x"), struct.Struct("<4xBxHQ8x"), struct.Struct("<QIIq")
+"""Fields of sections, symbols and relocations that are read here, those of the three classes below."""
 PROGBITS, SYMBOL_TABLE, RELOCATIONS = 1, 2, 4
 """Kinds of sections: contents, symbols, and places to be filled in with what has to be added."""
 ALLOCATED = 2
@@ -149,18 +150,14 @@ GLOBAL_FUNCTION = 0x12
 
 
 class ObjectSection(NamedTuple):
-    """A section of an object file, by the fields of `SECTION`; of relocations, `target` is what they fill in."""
+    """A section of an object file, with its alignment; of relocations, `target` is the section that they fill in."""
 
-    name: int
     kind: int
     flags: int
-    address: int
     offset: int
     size: int
-    link: int
     target: int
     alignment: int
-    entry_size: int
 
     def content(self, file: bytes) -> bytes:
         """Its bytes."""
@@ -168,32 +165,20 @@ class ObjectSection(NamedTuple):
 
 
 class ObjectSymbol(NamedTuple):
-    """A symbol, by the fields of `SYMBOL`: its value is its place in a section, given by number."""
+    """A symbol: its value is its place in a section, given by number."""
 
-    name: int
     binding_and_kind: int
-    visibility: int
     section: int
     value: int
-    size: int
 
 
 class ObjectRelocation(NamedTuple):
-    """A place to be filled in with the distance to a symbol, by the fields of `RELOCATION`."""
+    """A place to be filled in with the distance to a symbol, given by number, to which something is added."""
 
     place: int
-    symbol_and_kind: int
+    kind: int
+    symbol: int
     added: int
-
-    @property
-    def symbol(self) -> int:
-        """Number of the symbol."""
-        return self.symbol_and_kind >> 32
-
-    @property
-    def kind(self) -> int:
-        """Kind of the relocation: the form in which the distance is written."""
-        return self.symbol_and_kind & 0xFFFFFFFF
 
 
 def _linked_image(file: bytes) -> tuple[bytes, int]:

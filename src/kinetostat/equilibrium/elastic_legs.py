@@ -226,14 +226,9 @@ def like_legs(legs: Sequence[ElasticLeg]) -> list[LikeLegs]:
 
 
 class _LegForm(NamedTuple):
-    """All that legs have in common which are evaluated together.
+    """All that legs which are evaluated together have in common; the leg's own amounts are numbered from 0 in `given`.
 
-    Attributes:
-        given: for each motion, the number among the leg's own amounts of that which drives it; -1 for none.
-        alone: number of a leg that is left by itself, else None.
-        coordinate, shape: as in `Chain`, and the shape of its twists.
-        signs: bytes of the signs of its springs.
-        carried: as in `Masses`.
+    `alone` is the number of a leg that is left by itself, else None; `shape` is that of the twists of its chain.
     """
 
     given: tuple[int, ...]

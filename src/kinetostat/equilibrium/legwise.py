@@ -348,14 +348,23 @@ class LegwiseTangent:
             self.legs.append(condensed)
             force, turning = force - condensed.load_taken, turning + condensed.turning
         lines = [[part * (1.0 / pull.length) for part in pull.line] for pull in self.pulls]
-        along = array_of(lines, len(lines), 6) @ ways
-        self.lines = np.concatenate([along, *(leg.wrenches for leg in self.legs)])
-        rows = [along, *(leg.lines for leg in self.legs)]
-        gaps = np.concatenate([np.full(len(lines), 0.0, dtype=object), *(leg.gap for leg in self.legs)])
-        roots = [array_of([[sqrt(rod.softness)]], 1, 1) for rod in machine.rods] + [leg.roots for leg in self.legs]
-        self._solved = solve_condensed(np.concatenate(rows), block_diagonal(roots), turning, force, gaps)
+        of_rods = array_of(lines, len(lines), 6) @ ways
+        self.lines = np.concatenate([of_rods, *(leg.wrenches for leg in self.legs)])
+        self._solved = self._solve_platform(of_rods, turning, force)
         self.twist: Row = (ways @ self._solved.twist).tolist()
         self.step, self.motion, self._changes = self._steps(ways.T @ placed.screws[0].T)
+
+    def _solve_platform(self, of_rods: Array, turning: Array, load: Array) -> Condensed:
+        """Solve for the twist of the platform and the changes of all wrenches, of rods and then of legs.
+
+        Args:
+            of_rods: lines of the rods [rods x ways].
+            turning, load: as of `solve_condensed`.
+        """
+        lines = np.concatenate([of_rods, *(leg.lines for leg in self.legs)])
+        gaps = np.concatenate([np.full(len(of_rods), 0.0, dtype=object), *(leg.gap for leg in self.legs)])
+        roots = [array_of([[sqrt(rod.softness)]], 1, 1) for rod in self._rods] + [leg.roots for leg in self.legs]
+        return solve_condensed(lines, block_diagonal(roots), turning, load, gaps)
 
     def _platform_and_rods(self) -> tuple[Array, Array]:
         """The load on the platform that rods do not hold [ways], and the stiffness by its turning [ways x ways]."""
@@ -369,11 +378,11 @@ class LegwiseTangent:
         """Steps of all coordinates and wrenches; those that are motions; and those of each leg's wrench."""
         # Slides come first among the coordinates, and last in the twist.
         moving = elimination(rates[::-1].tolist(), symmetric=False).solve(self._solved.twist[::-1].tolist())
-        step, motion, changes, place = [*moving], self._solved.twist.tolist(), [], len(self.pulls)
+        step, motion, changes, first = [*moving], self._solved.twist.tolist(), [], len(self.pulls)
         for leg in self.legs:
-            count = len(leg.gap)
-            coordinates, wrench = leg.step(self._solved.twist, self._solved.changes[place : place + count])
-            place += count
+            last = first + len(leg.gap)
+            coordinates, wrench = leg.step(self._solved.twist, self._solved.changes[first:last])
+            first = last
             step, motion = [*step, *coordinates, *wrench], [*motion, *coordinates]
             changes.append(wrench)
         return step, motion, changes

@@ -40,7 +40,8 @@ from kinetostat.machine.machine import Member
 from kinetostat.tolerances import ACCURACY_OF_SHARE
 
 STEP_RATIO = 2.0
-"""Ratio of two steps that are tried together, one after the other in size: the largest leads to all of the loads."""
+"""Ratio of two steps that are tried together, one after the other in size: the largest leads to all of the loads. With
+twice the ratio, half as many states would be solved for, and twice as much could be missed between two of them."""
 CANDIDATES = 14
 """Number of steps that are tried together: the smallest is 2^-13 of the largest, below `ACCURACY_OF_SHARE`."""
 FEW_CANDIDATES = 4
@@ -244,4 +245,5 @@ def _pulls(lines: Sequence[Line], wrench: Array, reference: Vector) -> list[floa
 
 
 def _euler(bending: float, length: float) -> float:
+    """Return Euler's load of a strut between two hinges, N, from its E I in N·m² and its length in m."""
     return math.pi**2 * bending / length**2

@@ -230,8 +230,9 @@ def _solutions_where_regular(matrices: Array, right: Array) -> tuple[Array, Mask
 
     LAPACK refuses a whole stack of which one matrix has a pivot of exactly zero; a determinant has the same pivots.
     """
+    is_regular: Mask = np.ones(len(matrices), dtype=bool)
     try:
-        return np.linalg.solve(matrices, right), np.ones(len(matrices), dtype=bool)
+        return np.asarray(np.linalg.solve(matrices, right)), is_regular
     except np.linalg.LinAlgError:
         is_regular = np.asarray(np.linalg.slogdet(matrices).sign != 0.0)
         result = np.full(right.shape, np.nan)

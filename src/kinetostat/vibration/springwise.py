@@ -153,9 +153,7 @@ class SpringMotions:
         self._machine, self._tangent = machine, tangent
         # Of each leg, the deflections of its springs per unit of y: 1 / sqrt(k).
         self._deflections = [
-            array_of(
-                [[1.0 / sqrt(stiffness) for stiffness in leg.terms.carrying[0, leg.elastic]]], 1, len(leg.elastic)
-            )[0]
+            of_scalars([1.0 / sqrt(stiffness) for stiffness in leg.terms.carrying[0, leg.elastic]])[0]
             for leg in tangent.legs
         ]
         blocks = [array_of([[sqrt(rod.softness)]], 1, 1) for rod in machine.rods]
