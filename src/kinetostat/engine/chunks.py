@@ -76,12 +76,14 @@ def in_this_process(work: Work, numbers: Sequence[int]) -> Iterator[tuple[int, E
 
 
 DASK_MISSING = "--workers and --cluster need Dask, which is not installed; install it with `{}`."
+"""Refusal without Dask, with the command that installs it."""
 CHUNKS_AHEAD = 2
 """Chunks handed out per thread of the cluster: one that is computed and one that waits, so that no thread stands
 idle."""
 GO_ON = "Results that are already in a folder are kept: the same command continues from there."
+"""Advice after a cluster has failed."""
 CLUSTER_PATIENCE = "10 s"
-"""Time in which a cluster must answer."""
+"""Time in which a cluster must answer: far more than a network takes, and about as long as people wait."""
 
 
 @dataclass(frozen=True)

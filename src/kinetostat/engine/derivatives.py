@@ -103,10 +103,10 @@ def evaluate_gradient(
     function = _function(Identical(machine), tuple(points.paths), weights, tuple(paths), native)
     results, status = function.at(points, progress, 1 if function.slab else None)
     count = len(weights)
-    values, slopes = results[:count], results[count:].reshape(count, len(paths), points.size)
-    for value, slope in zip(values, slopes, strict=True):
-        slope[:, ~np.isfinite(value)] = math.nan
-    return Gradients(values, slopes, status)
+    objective_values, slopes = results[:count], results[count:].reshape(count, len(paths), points.size)
+    for row, slope in zip(objective_values, slopes, strict=True):
+        slope[:, ~np.isfinite(row)] = math.nan
+    return Gradients(objective_values, slopes, status)
 
 
 @lru_cache(FUNCTIONS_KEPT)
@@ -227,6 +227,7 @@ class _Routes:
         known_slopes = _slopes_at_end_stiffnesses(machine)
         end_slopes = {path: known_slopes[path] for path in paths if path in known_slopes and path not in varying}
         self._machine, self._weights, self._paths, self._native = machine, weights, paths, native
+        self._kind = Specimen(machine)
         self._known_slopes, self._differentiated = end_slopes, tuple(path for path in paths if path not in end_slopes)
         self._form, self._fixed = form_of(machine, varying, self._differentiated)
         self._modes, self._joints = modes, machine.chains().size if machine.family.chains else 0
@@ -238,14 +239,14 @@ class _Routes:
 
     def direct(self, closed: bool = False) -> Fill:
         """Return the fill by a single program, in which the family places the joints or `closed` forms give them."""
-        program = self._program(self._weights, closed)
+        program = self._program_of_objectives(closed)
 
         def fill(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
             program_inputs = program_columns(self._machine, self._form, columns, len(status), closed)
             program_inputs += self._rest_columns(program_inputs, len(status), closed)
             program_inputs += self._mode_columns(columns, len(status))
             if self._known_slopes:
-                self._fill_rows(*self._slopes(self._weights, program_inputs, status, closed), results)
+                self._fill_rows(*self._results_with_slopes(program, program_inputs, status, closed), results)
             else:
                 program.run(self._fixed, program_inputs, results, status)
 
@@ -254,13 +255,14 @@ class _Routes:
     def by_equations(self, columns: Mapping[str, Array], results: Array, status: Codes) -> None:
         """Fill by solving for the joints first; their derivatives follow from the closing equations."""
         program_inputs = program_columns(self._machine, self._form, columns, len(status))
-        rates = self._equations(program_inputs, len(status))
+        rates = self._closing_rates(program_inputs, len(status))
         program_inputs += self._rest_columns(program_inputs, len(status), closed=False)
         program_inputs += self._mode_columns(columns, len(status))
-        objectives, partial = self._slopes(self._weights, program_inputs, status)
+        program = self._program_of_objectives(closed=False)
+        objectives, partial = self._results_with_slopes(program, program_inputs, status)
         self._fill_rows(objectives, _slopes_as_joints_follow(partial, rates, len(self._differentiated)), results)
 
-    def _equations(self, program_inputs: Sequence[Array], count: int) -> Array:
+    def _closing_rates(self, program_inputs: Sequence[Array], count: int) -> Array:
         """Derivatives of the closing equations, and of those by which idle freedoms stand nearest to home, theory (34).
 
         The latter need the second derivatives of the closing equations along the idle motions: central differences of
@@ -270,13 +272,18 @@ class _Routes:
             [equations x inputs x points]; inputs are the parameters and then the joint coordinates.
         """
 
-        def rates_at(joints: Array) -> tuple[Array, Array]:
-            columns = [*program_inputs[: len(program_inputs) - len(joints) - 1], *joints, program_inputs[-1]]
-            values, rates = self._slopes((), columns, np.empty(count, dtype=np.int8))
-            return values[-1], rates
+        chains, first = self._machine.chains(), len(self._differentiated)
+        # Columns of the parameters come first, then those of the joints, and at last their status.
+        parameter_columns = program_inputs[: -chains.size - 1]
+        *joint_columns, status = program_inputs[-chains.size - 1 :]
+        program = program_of(recipe_of(equations_of, self._kind, self._form, paths=self._differentiated), self._native)
 
-        chains = self._machine.chains()
-        joints, first = np.stack(program_inputs[-chains.size - 1 : -1]), len(self._differentiated)
+        def rates_at(joints: Array) -> tuple[Array, Array]:
+            columns = [*parameter_columns, *joints, status]
+            results, rates = self._results_with_slopes(program, columns, np.empty(count, dtype=np.int8))
+            return results[-1], rates
+
+        joints = np.stack(joint_columns)
         length, rates = rates_at(joints)
         rates, length_rates = rates[:-1], rates[-1]
         units = units_of(chains, length).T
@@ -316,25 +323,25 @@ class _Routes:
             known = self._known_slopes.get(path)
             rows[:, k] = slopes[:, self._differentiated.index(path)] if known is None else known
 
-    def _slopes(
-        self, weights: tuple[Weights, ...], program_inputs: Sequence[Array], codes: Codes, closed: bool = False
+    def _results_with_slopes(
+        self, program: Runnable, program_inputs: Sequence[Array], codes: Codes, closed: bool = False
     ) -> tuple[Array, Array]:
-        """Results [results x points] of a program and their derivatives [results x inputs x points], codes in place."""
-        program = self._program(weights, closed)
+        """Results [results x points] of a program and their derivatives [results x inputs x points], codes in place.
+
+        Inputs are the parameters, and then the joint coordinates unless they are `closed` inside.
+        """
         rows, inputs = np.empty((program.rows, len(codes))), len(self._differentiated) + (0 if closed else self._joints)
         program.run(self._fixed, program_inputs, rows, codes)
         count = program.rows // (1 + inputs)
         return rows[:count], rows[count:].reshape(count, inputs, len(codes))
 
-    def _program(self, weights: tuple[Weights, ...], closed: bool) -> Runnable:
-        """The program of the objectives and their derivatives, or without weights that of the closing equations."""
-        kind, paths = Specimen(self._machine), self._differentiated
-        if not weights:
-            return program_of(recipe_of(equations_of, kind, self._form, paths=paths), self._native)
+    def _program_of_objectives(self, closed: bool) -> Runnable:
+        """The program of the objectives and their derivatives."""
         options = TraceOptions(
             closed=closed, limited=False, plan=self._plan, modes=self._modes, mode_counts=self._mode_counts
         )
-        recipe = recipe_of(objectives_of, kind, self._form, objectives=weights, options=options, paths=paths)
+        weights, paths = self._weights, self._differentiated
+        recipe = recipe_of(objectives_of, self._kind, self._form, objectives=weights, options=options, paths=paths)
         return program_of(recipe, self._native)
 
 

@@ -159,6 +159,7 @@ def _pointer(name: str, k: int) -> list[str]:
 
 
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
+"""Operations that are instructions of LLVM on two numbers, and its names of them."""
 FUSIBLE = "contract"
 """LLVM may fuse a product and a sum into one operation with one rounding; nothing else is relaxed (no fast-math)."""
 FUNCTIONS = {"abs": "fabs", "sqrt": "sqrt"}

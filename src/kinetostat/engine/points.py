@@ -164,6 +164,8 @@ PER_CELL = 2
 """Points in each cell: two are the fewest whose difference tells how uncertain their mean is."""
 PHILOX_WORDS = 4
 """Random numbers that Philox makes for each step of its counter."""
+KEYS_PER_SEED = 64
+"""Keys of Philox that a seed has for itself, one for each axis: more than any grid has axes."""
 
 
 @dataclass(frozen=True)
@@ -206,5 +208,5 @@ class Cells:
         """Return random numbers, uniform from 0 to 1: where in its cell each point lies along an axis."""
         # Philox can start anywhere in its sequence; each axis has a key, and so a sequence, of its own.
         block = start // PHILOX_WORDS
-        source = np.random.Philox(key=self.seed * 64 + axis, counter=block)
+        source = np.random.Philox(key=self.seed * KEYS_PER_SEED + axis, counter=block)
         return np.random.Generator(source).random(stop - block * PHILOX_WORDS)[start - block * PHILOX_WORDS :]

@@ -38,6 +38,7 @@ else:  # it needs NumPy, which `doctor` must not
 VARIABLE = "KINETOSTAT_CACHE"
 """Variable of the environment with another folder for them, or "off"."""
 OFF = "off"
+"""Value of the variable with which no programs are kept on disk."""
 MOST_BYTES = 64 << 20
 """Bytes of all files together; programs have some 10 to 300 kB, so that hundreds stay."""
 KEPT_SHARE = 0.75

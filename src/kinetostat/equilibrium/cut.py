@@ -154,11 +154,12 @@ def _without_spin(leg: ElasticLeg) -> ElasticLeg:
     carried = tuple(number - (number > turns[2]) for number in leg.masses.carried)
     return replace(
         leg,
-        chain=Chain(
-            twists[:, motions],
-            tuple(chain.coordinate[k] - (chain.coordinate[k] > left_out) for k in motions),
-            tuple(chain.given[k] for k in motions),
-            leg.size - 1,
+        chain=replace(
+            chain,
+            twists=twists[:, motions],
+            coordinate=tuple(chain.coordinate[k] - (chain.coordinate[k] > left_out) for k in motions),
+            given=tuple(chain.given[k] for k in motions),
+            size=leg.size - 1,
         ),
         springs=tuple(leg.springs[number] for number in kept),
         sign=leg.sign[kept],

@@ -96,6 +96,7 @@ def placed_platform(machine: Machine, direction: PoseRates, real_rates: PoseRate
         real_rates: the second rates, with which the machine really moves.
     """
     numbers = values(machine)
+    # Arrays and traced numbers do not take jets for operands, but jets without rates do.
     jets = {path: Jet(number) for path, number in numbers.items() if type(number) is not float}
     pose = {
         name: Jet(numbers[POSE + name], direction.rates[name], real_rates.rates[name], direction.change[name])
