@@ -211,14 +211,14 @@ def _least_gap(problems: Problems, unknowns: Array, goal: Coordinates) -> tuple[
     # The slope vanishes where the gap is greatest too, as at the end of a crank's stroke: the descent starts beside.
     best, is_least = unknowns + START_SHIFT * np.cos(np.arange(problems.size)), np.zeros(len(unknowns), dtype=bool)
     items, share = np.arange(len(unknowns)), np.ones(len(unknowns))
-    gaps, rates, distance = problems.gaps(best, goal)
+    gaps, rates, distance = problems.gaps(best, goal)  # distances are squared, and items those that still descend
     slope = np.einsum("nrc,nr->nc", rates, gaps)
     inverse = np.linalg.inv(np.einsum("nrc,nrd->ncd", rates, rates) + STIFFENING * np.eye(problems.size))
     for _ in range(MOST_DESCENTS):
-        settled = np.linalg.norm(slope, axis=1) <= LEAST_GAP_SETTLED * np.sqrt(distance)
+        is_flat = np.linalg.norm(slope, axis=1) <= LEAST_GAP_SETTLED * np.sqrt(distance)
         is_open = (distance > CLOSED * CLOSED) & np.isfinite(distance)
-        is_least[items[settled & is_open]] = True
-        remaining = ~settled & is_open
+        is_least[items[is_flat & is_open]] = True
+        remaining = ~is_flat & is_open
         items, share, inverse = items[remaining], share[remaining], inverse[remaining]
         slope, distance = slope[remaining], distance[remaining]
         if not items.size:

@@ -6,7 +6,7 @@ the gaps is elsewhere (`following`, `closure`).
 Source: theory (19)-(21); placements are in the base frame.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import fields, replace
 from itertools import islice
 from typing import Any, NamedTuple
@@ -37,7 +37,8 @@ class Build:
     """Legs with the same kinds of joints in a row.
 
     Attributes:
-        elements: moving elements of the legs, at the home pose; scalars are floats, or arrays [poses or 1 x legs].
+        elements: moving elements of the legs, at the home pose, of any class with a `mover`; their scalars are floats,
+            or arrays [poses or 1 x legs].
         slides: whether each coordinate is a length [elements].
         places: places of their coordinates among those of the machine [legs x elements].
     """
@@ -63,7 +64,7 @@ class Build:
 
 def builds_of(chains: Chains) -> list[Build]:
     """Sort the legs of a machine by their build."""
-    alike: dict[tuple[Any, ...], list[tuple[list[Any], Integers]]] = {}
+    alike: dict[Hashable, list[tuple[list[Any], Integers]]] = {}
     first = 0  # place of the leg's first coordinate among those of the machine
     for steps in chains.legs:
         # A spring that moves is placed as its joint.
@@ -79,7 +80,7 @@ def builds_of(chains: Chains) -> list[Build]:
     return builds
 
 
-def _build_key(element: Any) -> tuple[Any, ...]:
+def _build_key(element: Any) -> Hashable:
     """The class of an element, and which of its fields are points, names or None: alike in elements of one build.
 
     Only then can one evaluation place them all. A joint with a carriage and one without it differ.

@@ -10,7 +10,7 @@ from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from itertools import zip_longest
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from kinetostat.validation.machine_from_file import machine_from_file
 from kinetostat.vibration.modes import frequencies
 
 ROTATIONS, TRANSLATIONS = slice(0, 3), slice(3, 6)
+AnyAnswer = TypeVar("AnyAnswer")
 
 
 @dataclass(frozen=True)
@@ -147,7 +148,7 @@ class Engine:
         """
         return self._answer_of(lambda: import_module(self.modes).frequencies(machine)) if self.modes else np.zeros(0)
 
-    def _answer_of(self, question: Callable[[], Any]) -> Any:
+    def _answer_of(self, question: Callable[[], AnyAnswer]) -> AnyAnswer:
         """Return the answer of the engine to a question; what it raises becomes an InputError."""
         if self.version is None:
             raise InputError(

@@ -24,7 +24,7 @@ from kinetostat.kinematics.closing import Joints
 from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.cross_section import linear_density_of, rigidity_of
 from kinetostat.machine.leg import RIGID, Element, Joint, Leg, PartName, Spring, Turn
-from kinetostat.machine.link import Beam, Parallelogram, matrix_springs
+from kinetostat.machine.link import Beam, Parallelogram, Rigidity, matrix_springs
 from kinetostat.machine.loads import located_members
 from kinetostat.machine.machine import Configuration, Machine, Member, Plane
 from kinetostat.machine.parts import Arm
@@ -309,7 +309,7 @@ def _axial_rigidity(joint: Entry, document: Entry) -> float | None:
     return joint.get("axial_rigidity")
 
 
-def _rigidity(section: Entry, shear: bool = False) -> Any:
+def _rigidity(section: Entry, shear: bool = False) -> Rigidity:
     return rigidity_of(section["shape"], SimpleNamespace(**section), shear)
 
 

@@ -124,9 +124,7 @@ class LegBody:
         before, after = placements[first], placements[last]
         start, end = (vector(point) for point in self.ends)
         ends = Station(first, point_at(before, start)), Station(last, point_at(after, end))
-        centre: Station | None = None
-        if self.centre is not None:
-            centre = Station(first, point_at(before, vector(self.centre)))
+        centre = None if self.centre is None else Station(first, point_at(before, vector(self.centre)))
         tensor = None
         if self.inertia is not None:
             tensor = tensor_of(before[:3, :3] @ self.inertia @ before[:3, :3].T)

@@ -385,6 +385,7 @@ def rotor_inertia(machine: Machine, spring: Spring) -> float:
 
 
 def _stations(link: Member) -> tuple[Station, ...]:
+    """Return the centre of mass of a link, or its ends where its mass is spread evenly between them."""
     if link.centre is not None:
         return (link.centre(),)
     return () if link.ends is None else link.ends()
