@@ -46,11 +46,11 @@ STATES = {
     "rigid and free": ((RIGID_LINKS, FREE_LEG), "ok", ["Rigid: passive link 1", "Free: leg 1 actuator"]),
     "all rigid": ((RIGID_LINKS, "stiffness.actuator=rigid"), "ok", ["Rigid: passive link 1", "leg 4 actuator"]),
     "all free": (("stiffness.actuator=0", "stiffness.passive_links=0"), "ok", ["Free: passive link 1", "Free: leg 4"]),
-    "too far": (("pose.z=1.5",), "out_of_reach", ["passive leg", "1.5 m", "at most 1.36 m", "nearer"]),
+    "too far": (("pose.z=1.5",), "out_of_reach", ["passive leg", "1500 mm", "at most 1360 mm", "nearer"]),
     "too near": (
         ("geometry.passive_links.1=50 cm", "pose.z=0.1"),
         "out_of_reach",
-        ["passive leg", "0.1 m", "at least 0.18 m", "away"],
+        ["passive leg", "100 mm", "at least 180 mm", "away"],
     ),
     "stretched": (("pose.z=1.36",), "singular", ["passive leg lock up", "stretched, folded or aligned"]),
     "folded": (("pose.z=0",), "singular", ["passive leg"]),

@@ -189,7 +189,7 @@ def test_bad_input_is_one_clear_paragraph(arguments, expected, capsys):
 
 
 @pytest.mark.parametrize(
-    ("setting", "words"), [("pose.z=2 m", "at most 1.36 m"), ("pose.z=1.36 m", "passive leg lock up")]
+    ("setting", "words"), [("pose.z=2 m", "at most 1360 mm"), ("pose.z=1.36 m", "passive leg lock up")]
 )
 def test_a_pose_without_answer_exits_1_and_says_why(setting, words, capsys):
     for command in ("analyze", "check"):

@@ -92,7 +92,7 @@ def test_step_says_which_library_of_the_system_it_lacks(tmp_path, monkeypatch, c
         ([MACHINE, "--to", "iges"], BAD_INPUT, "mjcf, mjcf-vibration, urdf"),
         ([MACHINE, "-o", "a.docx"], BAD_INPUT, "one of these suffixes"),
         (["nope", "--to", "csv"], BAD_INPUT, "neither a file nor a bundled machine"),
-        ([MACHINE, "--to", "csv", "--set", "pose.z=3 m"], NO_ANSWER, "span 3 m"),
+        ([MACHINE, "--to", "csv", "--set", "pose.z=3 m"], NO_ANSWER, "span 3000 mm"),
         ([MACHINE, "--to", "ansys", "--set", "stiffness.passive_links=rigid"], BAD_INPUT, "K is not finite"),
     ],
 )

@@ -131,7 +131,7 @@ def test_rigid_directions_are_said_to_be_rigid(capsys):
         (["--over", "geometry.base_radius=20 cm:30 cm:3"], 2, "is not a coordinate of the pose"),
         (["--over", "x=0:1 cm:20000"], 2, "at most 10,000"),
         (["--over", "x=0:1 cm"], 2, "not a range"),
-        (["--set", "pose.z=3 m"], 1, "have to span 3 m"),
+        (["--set", "pose.z=3 m"], 1, "have to span 3000 mm"),
     ],
 )
 def test_what_it_refuses(arguments, code, said, capsys):

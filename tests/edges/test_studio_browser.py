@@ -160,7 +160,7 @@ def test_an_impossible_pose_keeps_the_picture(page):
     box.press("Enter")
     page.until_changed(".pose-status", "ok")
     assert page.text(".pose-status") == "out of reach"
-    assert "at most 1.36 m" in page.text(".pose-message")
+    assert "at most 1360 mm" in page.text(".pose-message")
     assert coloured(page)[0] > 1000
     page.tab.keyboard.press("Escape")
     page.tab.get_by_role("button", name="Undo (Ctrl+Z)").click()

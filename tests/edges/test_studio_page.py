@@ -162,7 +162,7 @@ def test_an_impossible_pose_says_why_and_keeps_the_last_picture():
         figures = page.one("headline").content
         await page.send("control pose.z", "write", "2 m")
         assert page.one("status").text == "out of reach"
-        assert "at most 1.36 m" in page.one("message").text
+        assert "at most 1360 mm" in page.one("message").text
         assert page.shown("MachineView", "show") is drawn
         assert page.one("headline").content == figures
         assert page.one("control pose.z")._props["text"] == "2000 mm"
