@@ -238,9 +238,7 @@ def analyze(machine: Machine | MachineState, axes: str = "base") -> Analysis:
     """
     choice(axes, AXES, "axes")
     state = state_of(machine)
-    response, components = state.response, state.machine.family.components
-    configuration = response.configuration
-    turn = IDENTITY if axes == "base" else configuration.platform.rotation.inverse()
+    turn = IDENTITY if axes == "base" else state.configuration.platform.rotation.inverse()
     unanswered = Analysis(
         state=state,
         status=state.status,
@@ -250,6 +248,13 @@ def analyze(machine: Machine | MachineState, axes: str = "base") -> Analysis:
     )
     if state.status is not Status.OK:
         return _without_answer(unanswered, turn)
+    return _with_answer(unanswered, turn)
+
+
+def _with_answer(analysis: Analysis, turn: Rotation) -> Analysis:
+    """Return an analysis with all that is known at a pose with an answer; `turn` leads from base axes to its own."""
+    state, components = analysis.state, analysis.machine.family.components
+    response, configuration = state.response, state.configuration
     # Screws are cleaned before they are turned, where an exact zero is easy to tell, and once more after it, because
     # turning adds round-off of its own.
     response = replace(response, statics=clean_statics(response.statics))
@@ -261,7 +266,7 @@ def analyze(machine: Machine | MachineState, axes: str = "base") -> Analysis:
     indices = indices_of(stiffness_rows, compliance_rows, length, components)
     weakest = {name: softest(block, name, all_springs, statics) for name, block in (indices.free or {}).items()}
     answer = replace(
-        _with_place(unanswered),
+        _with_place(analysis),
         stiffness=stiffness_rows,
         compliance=compliance_rows,
         stiffness_diagonal=np.array([float(stiffness.entry(i, i)) for i in components]),

@@ -288,7 +288,7 @@ def command(machine: Machine, poses: Any = None, fit: str | Path | None = None) 
     refuse_tensions(machine)
     record = None if fit is None else read_fit(fit)
     if record is not None:
-        record.check(machine, drawn=False)
+        record.check(machine)
         _refuse_drawn(machine, record)
     columns = None if poses is None else given_poses(machine, poses)
     leaves, count = ({}, 1) if columns is None else (columns.leaves, columns.count)
@@ -309,9 +309,15 @@ def command(machine: Machine, poses: Any = None, fit: str | Path | None = None) 
 
 
 def home_coordinates(machine: Machine) -> dict[str, float]:
-    """Coordinates of the actuators of a machine written leg by leg at its home pose, by name, m or rad."""
-    home = pose_coordinates(machine.chains().home) if machine.family.chains else {}
-    pose = {f"{POSE}{name}": float(home[name]) for name in machine.chains().pose} if home else {}
+    """Coordinates of the actuators of a machine at its home pose, by name, m or rad.
+
+    A family in closed form has no home pose: its own pose counts.
+    """
+    pose: dict[str, float] = {}
+    if machine.family.chains:
+        chains = machine.chains()
+        home = pose_coordinates(chains.home)
+        pose = {f"{POSE}{name}": float(home[name]) for name in chains.pose}
     return {actuator.name: actuator.coordinate for actuator in analyze(changed(machine, pose)).actuators}
 
 
@@ -319,11 +325,11 @@ def _refuse_drawn(machine: Machine, record: FitRecord) -> None:
     """Refuse a machine as drawn, whose numbers are not those that the fit has found."""
     if record.numbers is None:
         # The fit of a family in closed form writes the machine as built leg by leg: the family itself is the drawing.
-        drawn = record.family == machine.family.name and machine.family.chains is None
+        is_drawn = record.family == machine.family.name and machine.family.chains is None
     else:
         numbers = values(machine)
-        drawn = any(not math.isclose(numbers.get(path, math.nan), number) for path, number in record.numbers.items())
-    if drawn:
+        is_drawn = any(not math.isclose(numbers.get(path, math.nan), built) for path, built in record.numbers.items())
+    if is_drawn:
         raise InputError(
             f'{machine.name} is the machine as drawn, and the fit "{record.path}" is about the one as built; give the '
             "machine.toml that lies beside it."

@@ -100,7 +100,7 @@ def uncertain_numbers(machine: Machine, model: ErrorModel, fit: Path | None) -> 
 def _numbers_of_fit(machine: Machine, places: Mapping[str, int], path: Path) -> UncertainNumbers:
     """The numbers of a fit that act on the compliance of a machine; `places` are those of errors by their paths."""
     record = read_fit(path)
-    record.check(machine)
+    record.check_drawn(machine)
     rows = [n for n, u in enumerate(record.unknowns) if u.group not in (*GROUPS_WITHOUT_COMPLIANCE, "frame", "target")]
     missing = [record.unknowns[n].path for n in rows if record.unknowns[n].path not in places]
     if missing:

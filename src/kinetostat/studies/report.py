@@ -265,7 +265,7 @@ def gather(
         raise InputError(f"a report maps one coordinate or two, not {len(ranges)}; leave out one --over.")
     record = read_fit(fit) if fit else None
     if record:
-        record.check(machine, drawn=False)
+        record.check(machine)
     state = state_of(machine)
     analysis = analyze(state)
     if analysis.status is not Status.OK:

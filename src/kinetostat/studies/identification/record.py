@@ -139,19 +139,23 @@ class FitRecord:
                 values[list(actuators).index(name)] = unknown.value
         return values
 
-    def check(self, machine: Machine, drawn: bool = True) -> None:
-        """Refuse a machine that was not fitted.
+    def check(self, machine: Machine) -> None:
+        """Refuse a machine that was not fitted; the drawn one passes, and the one that the fit has written.
 
-        Args:
-            machine: the machine that a user names beside the record.
-            drawn: whether it must be the drawn machine; otherwise the one that the fit has written will do as well.
+        Raises:
+            InputError: the machine has another name.
+        """
+        if self.machine != machine.name:
+            raise InputError(f'"{self.path}" is the fit of {self.machine}, not of {machine.name}; give that machine.')
+
+    def check_drawn(self, machine: Machine) -> None:
+        """Refuse a machine that is not the drawn one that was fitted.
 
         Raises:
             InputError: the machine has another name or is of another family.
         """
-        if self.machine != machine.name:
-            raise InputError(f'"{self.path}" is the fit of {self.machine}, not of {machine.name}; give that machine.')
-        if drawn and self.family not in ("", machine.family.name):
+        self.check(machine)
+        if self.family not in ("", machine.family.name):
             raise InputError(
                 f'"{self.path}" is the fit of a machine of the family {self.family}, and {machine.name} is of '
                 f"{machine.family.name}; give the machine as drawn, not the file that the fit has written."
