@@ -31,7 +31,7 @@ CATALOGUE = "kinetostat.machine.catalogue"
 PARTICIPLES_LEFT: dict[str, int] = {
     "algebra": 4,
     "kinematics": 1,
-    "machine": 17,
+    "machine": 14,
     "spec": 1,
     "studies": 1,
 }

@@ -393,15 +393,14 @@ def template(family: str) -> str:
     if family in bundled() and family not in families():
         return bundled()[family]
     wanted = family if family == NAME else _family(family, "kinetostat new").name
-    read = [(name, text, documents.parse(text, "")) for name, text in bundled().items()]
-    candidates = [
-        (_has_cables(document), len(name), text) for name, text, document in read if document["family"] == wanted
-    ]
+    parsed = {name: documents.parse(text, "") for name, text in bundled().items()}
+    candidates = [name for name, document in parsed.items() if document["family"] == wanted]
     if not candidates:
         raise InputError(
             f'kinetostat has no example file of the family "{wanted}"; look in the package that registers it.'
         )
-    return min(candidates)[-1]  # a machine of cables shows no joint, and variants of a machine add words to its name
+    # A machine of cables shows no joint, and variants of a machine add words to its name.
+    return bundled()[min(candidates, key=lambda name: (_has_cables(parsed[name]), len(name)))]
 
 
 def _has_cables(document: Document) -> bool:

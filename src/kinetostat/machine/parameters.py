@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from operator import itemgetter
-from typing import Any, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 from kinetostat.algebra.scalar import Scalar
 from kinetostat.frozen import dataclass
@@ -341,19 +341,31 @@ def check_contrast(machine: HasNumbers, origin: str) -> None:
 
 def doubts(machine: HasNumbers) -> Iterator[str]:
     """A sentence for each implausible number: an angle beyond a turn, one length beyond all, no stiffness."""
-    numbers = list(_numbers(machine))
+    numbers = list(_finite_numbers(machine))
+    lengths = [number for number in numbers if number.kind == "length"]
     for path, field, kind, value in numbers:
         if kind == "angle" and abs(value) > FULL_TURN:
             yield f'{path} is {value:g} rad, more than a turn; if degrees are meant, write "{value:g} deg".'
-        others = [abs(v) for _, other, k, v in numbers if k == kind == "length" and other != field]
-        if 0.0 < MOST_TIMES * max(others, default=0.0) < abs(value):
-            yield f'{path} is {value:g} m, over {MOST_TIMES:g} times all others; if mm are meant, write "{value:g} mm".'
+        if kind == "length":
+            longest = max((abs(other.value) for other in lengths if other.field != field), default=0.0)
+            if 0.0 < MOST_TIMES * longest < abs(value):
+                advice = f'if mm are meant, write "{value:g} mm".'
+                yield f"{path} is {value:g} m, over {MOST_TIMES:g} times all others; {advice}"
         if kind == "linear stiffness" and 0.0 < value < SOFTEST_PLAUSIBLE:
             yield f'{path} is {value:g} N/m, next to nothing; if N/um are meant, write "{value:g} N/um".'
 
 
-def _numbers(machine: HasNumbers) -> Iterator[tuple[str, str, str, float]]:
-    """Path, field, kind and value of every finite number; once for all entries of a field that are alike."""
+class _FiniteNumber(NamedTuple):
+    """A number of a machine, SI: its path, that of its field, and the kind of quantity."""
+
+    path: str
+    field: str
+    kind: str
+    value: float
+
+
+def _finite_numbers(machine: HasNumbers) -> Iterator[_FiniteNumber]:
+    """Give every finite number of a machine; once for all entries of a field that are alike."""
     scalars = values(machine)
     fields = {p.path: p for p in parameters(machine.family)}
     entries = {leaf for p in fields.values() if p.quantity.count for leaf in p.leaves}
@@ -361,4 +373,4 @@ def _numbers(machine: HasNumbers) -> Iterator[tuple[str, str, str, float]]:
         finite = {leaf: float(scalars[leaf]) for leaf in field.leaves if math.isfinite(scalars[leaf])}
         if len(set(finite.values())) == 1:
             finite = {field.path: next(iter(finite.values()))}
-        yield from ((path, field.path, field.quantity.kind, value) for path, value in finite.items())
+        yield from (_FiniteNumber(path, field.path, field.quantity.kind, value) for path, value in finite.items())

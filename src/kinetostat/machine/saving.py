@@ -54,6 +54,7 @@ def written_at(machine: Machine, paths: Iterable[str]) -> dict[str, Any]:
 
 
 def _value_at(value: Any, keys: list[str]) -> Any:
+    """Return what stands in a document below some keys; a value where a table or list would be stands for all in it."""
     try:
         for key in keys:
             value = _inside(value, key) if isinstance(value, dict | list) else value
@@ -67,17 +68,17 @@ def _edited_text(written: Written, machine: Machine) -> str | None:
     try:
         document = tomlkit.parse(written.text)
         remove_replaced_form(document, written.settings, tuple(quantities(machine.family.tables["pose"])), machine.name)
-        for setting in (text for text in written.settings if not text.startswith(TOLERANCES)):
-            path, _, text = setting.partition("=")
+        for setting in (setting for setting in written.settings if not setting.startswith(TOLERANCES)):
+            path, _, value = setting.partition("=")
             *table, key = path.strip().split(".")
             container = _table_at(document, table)
             if isinstance(container, dict | list):  # else one value stands for all entries, and one of them was set
-                _put(container, key, setting_value(text.strip()))
+                _put(container, key, setting_value(value.strip()))
         for _ in range(MOST_EDITS):
-            text = tomlkit.dumps(document)
-            present = build(text, machine.name)
+            edited = tomlkit.dumps(document)
+            present = build(edited, machine.name)
             if _is_same(present, machine):
-                return text
+                return edited
             _write_differences(document, present, machine)
     except (TOMLKitError, InputError, LookupError, TypeError, ValueError):
         return None

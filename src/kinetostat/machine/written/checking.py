@@ -74,11 +74,16 @@ def _check_axes(data: Any, where: str) -> None:
 
 
 def _check_plane(joint: JointPlan, data: Any, where: str) -> None:
-    axis = getattr(data, "axis", (0.0, 0.0, 1.0))
-    # The part of the axis that must be nothing beside it: 0 of a joint that always moves in the plane, infinite of one
-    # that never does.
-    wrong_parts = {"normal": math.hypot(axis[0], axis[1]), "along": abs(axis[2]), "always": 0.0, "": math.inf}
-    if not wrong_parts[JOINT_TYPES[joint.kind].in_plane] < PARALLEL_IN_FILE * math.hypot(*axis):
+    """Refuse a joint of a planar machine that leads out of its plane."""
+    x, y, z = getattr(data, "axis", (0.0, 0.0, 1.0))
+    match JOINT_TYPES[joint.kind].in_plane:
+        case "normal":
+            sine = math.hypot(x, y) / math.hypot(x, y, z)
+        case "along":
+            sine = abs(z) / math.hypot(x, y, z)
+        case always_or_never:
+            sine = 0.0 if always_or_never == "always" else 1.0
+    if sine >= PARALLEL_IN_FILE:
         raise InputError(
             f"{where}: in a planar machine joints are revolute about z, prismatic in the x-y plane, or fixed; "
             'change its axis or its type, or write space = "spatial".'

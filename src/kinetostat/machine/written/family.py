@@ -106,7 +106,7 @@ def configure(plan: Plan, joints: Sequence[Scalar | Turn], **tables: Any) -> Con
 def chains(plan: Plan, **tables: Any) -> Chains:
     """All legs at the home pose."""
     parts = [_parts_at_home(plan, leg, tables) for leg in plan.legs]
-    legs = tuple(tuple(step for moving, link in row for step in (*moving, *link)) for row in parts)
+    legs = tuple(tuple(step for part in row for step in (*part.joint, *part.link)) for row in parts)
     home = Displacement(IDENTITY, Vector(*tables["platform"].point))
     return Chains(
         legs=legs,
@@ -157,10 +157,17 @@ def _with_line(element: Joint | Spring, point: Vector, axis: Vector | None = Non
     return replace(element, point=point, axis=axis or element.axis)
 
 
-def _parts_at_home(plan: Plan, leg: LegPlan, tables: Mapping[str, Any]) -> list[tuple[list[Step], list[Step]]]:
-    """The elements of each joint of a leg at the home pose, from base to platform, and those of the link behind it."""
+class _JointAndLink(NamedTuple):
+    """The elements of a joint, in order from the base, and those of the flexible link behind it."""
+
+    joint: list[Step]
+    link: list[Step]
+
+
+def _parts_at_home(plan: Plan, leg: LegPlan, tables: Mapping[str, Any]) -> list[_JointAndLink]:
+    """The elements of a leg at the home pose, joint by joint, from base to platform."""
     data = [joint_numbers(leg, joint, tables) for joint in leg.joints]
-    parts: list[tuple[list[Step], list[Step]]] = []
+    parts: list[_JointAndLink] = []
     for i, joint in enumerate(leg.joints):
         seat = [Step(spring, False) for spring in _seat(leg, joint, data[i])]
         moving = _moving(leg, joint, data[i], plan, tables)
@@ -171,7 +178,7 @@ def _parts_at_home(plan: Plan, leg: LegPlan, tables: Mapping[str, Any]) -> list[
         if link is not None:
             ends = departure(data[i]), Vector(*data[i + 1].point)
             flexible = [Step(element, False) for element in _link_elements(leg, link, ends, plan, tables)]
-        parts.append((steps, flexible))
+        parts.append(_JointAndLink(steps, flexible))
     return parts
 
 
@@ -274,10 +281,12 @@ def _carriers(
     """Placements of the links of a leg at the coordinates of its joints."""
     motion, carried = Displacement(IDENTITY, ZERO), 0
     carriers: list[Carrier | None] = []
-    for moving, flexible in _parts_at_home(plan, leg, tables):
-        motion = placed_chain([replace(s, element=s.element.displaced(motion)) for s in moving], joints)[1] @ motion
-        carried += len(moving) + len(flexible)
-        carriers.append(Carrier(motion, carried - len(flexible), carried))
+    for part in _parts_at_home(plan, leg, tables):
+        moved_joint = [replace(step, element=step.element.displaced(motion)) for step in part.joint]
+        motion = placed_chain(moved_joint, joints)[1] @ motion
+        to_start = carried + len(part.joint)
+        carried = to_start + len(part.link)
+        carriers.append(Carrier(motion, to_start, carried))
     return carriers
 
 
