@@ -77,23 +77,23 @@ def nearest_home(problems: Problems, unknowns: Array, goal: Coordinates) -> Arra
         return best
     rates = problems.gaps(best, goal).rates
     rows = np.flatnonzero(~_surely_held(rates))
-    rows = rows[_idle_freedoms(rates[rows]) > 0]
+    rows = rows[_idle_freedoms(rates[rows]) > 0]  # problems that still move towards their nearest posture
     share, slope_before = np.ones(len(rows)), np.full(len(rows), np.inf)
     for _ in range(MOST_POSTURE_STEPS):
         if not rows.size:
             break
         idle, goal_of_idle = problems.subset(rows), coordinates_at(goal, rows)
         step, slope = _posture_steps(idle, best[rows], goal_of_idle)
-        end, closed = _closing_step(idle, best[rows] + share[:, None] * step, goal_of_idle)
+        end, is_closed = _closing_step(idle, best[rows] + share[:, None] * step, goal_of_idle)
         # Sums of squares tell steps apart down to half of the digits; shorter ones are Newton's last and taken whole.
-        short = largest(step) <= SURE_STEP
-        nearer = closed & (short | ((end**2).sum(axis=1) < (best[rows] ** 2).sum(axis=1)))
+        is_short = largest(step) <= SURE_STEP
+        nearer = is_closed & (is_short | ((end**2).sum(axis=1) < (best[rows] ** 2).sum(axis=1)))
         best[rows[nearer]] = end[nearer]
         share = np.where(nearer, 1.0, SHORTENING * share)
         # Near the nearest posture the slope falls with its square; one that is not even halved is round-off.
-        settled = short & ((slope <= NEAREST_POSTURE) | (slope > 0.5 * slope_before))
-        unsettled = ~settled & (share >= SHORTEST_SHARE)
-        rows, share, slope_before = rows[unsettled], share[unsettled], slope[unsettled]
+        is_nearest = is_short & ((slope <= NEAREST_POSTURE) | (slope > 0.5 * slope_before))
+        is_open = ~is_nearest & (share >= SHORTEST_SHARE)
+        rows, share, slope_before = rows[is_open], share[is_open], slope[is_open]
     return best
 
 
@@ -122,15 +122,15 @@ def _posture_steps(problems: Problems, unknowns: Array, goal: Coordinates) -> tu
     steps, largest_slopes = np.zeros_like(unknowns), np.zeros(len(unknowns))
     for count in np.unique(idle[idle > 0]):
         rows = np.flatnonzero(idle == count)
-        kept = rates.shape[2] - count
-        motions = right[rows, kept:]
+        rank = rates.shape[2] - count
+        motions = right[rows, rank:]
         slopes = np.einsum("nic,nc->ni", motions, unknowns[rows])
         # Lagrange's multipliers: how strongly each gap keeps the joints from their home positions.
-        pulls = np.einsum("nkc,nc->nk", right[rows, :kept], unknowns[rows]) / sizes[rows, :kept]
-        loads = np.einsum("nrk,nk->nr", left[rows, :, :kept], pulls)
+        pulls = np.einsum("nkc,nc->nk", right[rows, :rank], unknowns[rows]) / sizes[rows, :rank]
+        loads = np.einsum("nrk,nk->nr", left[rows, :, :rank], pulls)
         curvature = _curvature_along(problems.subset(rows), unknowns[rows], coordinates_at(goal, rows), motions, loads)
-        bends, axes = np.linalg.eigh(0.5 * (curvature + np.swapaxes(curvature, 1, 2)))
-        amounts = np.einsum("nij,ni->nj", axes, slopes) / np.maximum(np.abs(bends), IDLE_FREEDOM)
+        curvatures, axes = np.linalg.eigh(0.5 * (curvature + np.swapaxes(curvature, 1, 2)))
+        amounts = np.einsum("nij,ni->nj", axes, slopes) / np.maximum(np.abs(curvatures), IDLE_FREEDOM)
         step = -np.einsum("nij,nj,nic->nc", axes, amounts, motions)
         steps[rows] = step * np.minimum(1.0, LONGEST_POSTURE_STEP / np.maximum(largest(step), LEAST_DIVISOR))[:, None]
         largest_slopes[rows] = largest(slopes)
@@ -208,13 +208,13 @@ class _Search:
     Attributes:
         problems: the equations of all legs, with every coordinate of the pose free.
         home: coordinates of the platform at the home pose.
-        rows: numbers of the unknowns that have a goal.
+        goal_unknowns: numbers of the unknowns that have a goal.
         goal: the values that these unknowns should have.
     """
 
     problems: Problems
     home: dict[str, float]
-    rows: Integers
+    goal_unknowns: Integers
     goal: Array
 
     def nearest(self) -> Array:
@@ -252,7 +252,7 @@ class _Search:
             from the goal [rows]; and whether an undamped step would gain nothing that people see.
         """
         to_goal = np.zeros(len(place.unknowns))
-        to_goal[self.rows] = self.goal - place.unknowns[self.rows]
+        to_goal[self.goal_unknowns] = self.goal - place.unknowns[self.goal_unknowns]
         distance, allowed = np.linalg.norm(to_goal), _allowed_motions(place.rates)
         loads: Array = np.asarray(np.linalg.lstsq(place.rates.T, to_goal, rcond=DEPENDENT)[0], dtype=float)
         curvatures, axes = np.linalg.eigh(self._curvature(place, allowed, loads))
@@ -272,11 +272,11 @@ class _Search:
         problems = self.problems.subset(np.zeros(allowed.shape[1], dtype=int))
         rates_beside = problems.gaps(place.unknowns + CURVATURE_STEP * allowed.T, self.home).rates
         of_legs = np.einsum("r,nrc->nc", loads, rates_beside - place.rates) @ allowed / CURVATURE_STEP
-        return np.asarray(allowed[self.rows].T @ allowed[self.rows] + 0.5 * (of_legs + of_legs.T))
+        return np.asarray(allowed[self.goal_unknowns].T @ allowed[self.goal_unknowns] + 0.5 * (of_legs + of_legs.T))
 
     def _half_squares(self, places: _Place, loads: Array) -> Array:
         """Half the squared distances from the goal as they will be once the gaps that are left are closed [places]."""
-        squares = (self.goal - places.unknowns[..., self.rows]) ** 2
+        squares = (self.goal - places.unknowns[..., self.goal_unknowns]) ** 2
         return np.asarray(0.5 * squares.sum(axis=-1) - places.gaps @ loads)
 
     def _closed_ends(self, start: Array, steps: Array) -> _Place:

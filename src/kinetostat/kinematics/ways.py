@@ -112,17 +112,17 @@ def around_the_base(problems: Problems, goal: Coordinates) -> Way:
     """The leg's last joint on an arc around its first one, its distance evenly: what a leg reaches is often a shell."""
     frame = _LegEnds(problems, goal)
     near, far = frame.arms
-    sizes = np.linalg.norm(near, axis=1), np.linalg.norm(far, axis=1)
-    start, end = near / sizes[0][:, None], far / sizes[1][:, None]
+    near_size, far_size = np.linalg.norm(near, axis=1), np.linalg.norm(far, axis=1)
+    start, end = near / near_size[:, None], far / far_size[:, None]
     across = np.cross(start, end)
     angle = np.arctan2(np.linalg.norm(across, axis=1), (start * end).sum(axis=1))
 
     def way(share: Array) -> Coordinates:
-        curved = np.sin(angle) > SAME_RAY
-        sine = np.where(curved, np.sin(angle), 1.0)
-        first = np.where(curved, np.sin((1.0 - share) * angle) / sine, 1.0 - share)
-        last = np.where(curved, np.sin(share * angle) / sine, share)
-        size = sizes[0] + (sizes[1] - sizes[0]) * share
+        is_curved = np.sin(angle) > SAME_RAY
+        sine = np.where(is_curved, np.sin(angle), 1.0)
+        first = np.where(is_curved, np.sin((1.0 - share) * angle) / sine, 1.0 - share)
+        last = np.where(is_curved, np.sin(share * angle) / sine, share)
+        size = near_size + (far_size - near_size) * share
         return frame.at(share, (start * first[:, None] + end * last[:, None]) * size[:, None])
 
     return way
@@ -134,16 +134,16 @@ def about_the_first_axis(problems: Problems, goal: Coordinates) -> Way:
     axis = frame.axis
     low, high = ((arm * axis).sum(axis=1) for arm in frame.arms)
     near, far = (arm - axis * height[:, None] for arm, height in zip(frame.arms, (low, high), strict=True))
-    sizes = np.linalg.norm(near, axis=1), np.linalg.norm(far, axis=1)
+    near_radius, far_radius = np.linalg.norm(near, axis=1), np.linalg.norm(far, axis=1)
     angle = np.arctan2((np.cross(near, far) * axis).sum(axis=1), (near * far).sum(axis=1))
-    outward = near / sizes[0][:, None]
+    outward = near / near_radius[:, None]
     sideways = np.cross(axis, outward)
 
     def way(share: Array) -> Coordinates:
         turn = (share * angle)[:, None]
-        size = (sizes[0] + (sizes[1] - sizes[0]) * share)[:, None]
+        radius = (near_radius + (far_radius - near_radius) * share)[:, None]
         height = (low + (high - low) * share)[:, None]
-        return frame.at(share, axis * height + (outward * np.cos(turn) + sideways * np.sin(turn)) * size)
+        return frame.at(share, axis * height + (outward * np.cos(turn) + sideways * np.sin(turn)) * radius)
 
     return way
 
