@@ -9,9 +9,11 @@ import pytest
 from kinetostat.accuracy.built import as_built
 from kinetostat.accuracy.model import error_model
 from kinetostat.kinematics.forward import system_of
+from kinetostat.machine.loading import build
 from kinetostat.machine.machine import springs
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.numerics.motions import Motions, exponential
+from kinetostat.spec import document
 from kinetostat.spec.errors import InputError
 from kinetostat.studies.identification.fit import FitOptions, best_fit
 from kinetostat.studies.identification.identification import identification_of, identify
@@ -203,6 +205,42 @@ def test_a_crank_may_be_commanded_beyond_half_a_turn(tmp_path):
     placed = with_values(machine, {name: float(values[0]) for name, values in commanded.items()})
     turned = next(actuator for actuator in system_of(placed).actuators if actuator.leg == "leg 4")
     assert math.remainder(turned.coordinate - math.radians(-181.0), math.tau) == pytest.approx(0.0, abs=1e-9)
+
+
+ARM = """
+schema = 1
+name = "arm"
+family = "legs"
+space = "planar"
+[platform]
+point = ["0.5 m", "0.3 m", 0]
+[pose]
+x = "0.5 m"
+y = "0.3 m"
+yaw = 0
+[[legs]]
+name = "arm"
+joints = [
+  { name = "shoulder", type = "revolute", joins = ["base", "upper"], point = [0, 0, 0], axis = [0, 0, 1], actuated = true, stiffness = 1e5 },
+  { name = "elbow", type = "revolute", joins = ["upper", "lower"], point = [0.5, 0, 0], axis = [0, 0, 1], actuated = true, stiffness = 1e5 },
+  { name = "wrist", type = "revolute", joins = ["lower", "platform"], point = [0.5, 0.3, 0], axis = [0, 0, 1], actuated = true, stiffness = 1e5 },
+]
+"""  # noqa: E501
+"""One leg with three actuators."""
+
+
+def test_a_commanded_actuator_has_one_column_and_one_name(tmp_path):
+    """The name of a leg with several actuators means none of them, and none is commanded twice."""
+    path, arm = tmp_path / "data.csv", build(document.parse(ARM, "arm"), "arm")
+    path.write_text("actuator.arm elbow [deg], measured.x [mm]\n5, 500\n")
+    turned = read_measurements(arm, path, Sigmas(1e-5, 1e-5)).pose
+    assert turned["pose.yaw"] == pytest.approx(math.radians(5.0))
+    path.write_text("actuator.arm [deg], measured.x [mm]\n5, 500\n")
+    with pytest.raises(InputError, match=r"no column actuator\.arm; choose from actuator\.arm shoulder"):
+        read_measurements(arm, path, Sigmas(1e-5, 1e-5))
+    path.write_text("actuator.leg 4 [deg], actuator.leg 4 actuator [deg], measured.z [mm]\n5, 6, 300\n")
+    with pytest.raises(InputError, match="are one actuator; leave one of them out"):
+        read_measurements(load_without_limits("hexapod-rus"), path, Sigmas(1e-5, 1e-5))
 
 
 def test_positions_in_another_unit_are_noticed(tmp_path):

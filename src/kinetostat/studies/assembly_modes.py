@@ -125,10 +125,10 @@ def _placed_actuators(system: System, coordinates: Mapping[str, float | str], ma
     """The actuators at the coordinates that are given, or where they stand."""
     if not system.actuators:
         raise InputError(f"{machine.name} has no actuator; forward kinematics needs one for each freedom.")
-    names = _names(system)
+    numbers = actuator_numbers(system)
     commanded: dict[str, Actuator] = {}
     for name, value in coordinates.items():
-        actuator = names[choice(name, names, "the name of an actuator")]
+        actuator = system.actuators[numbers[choice(name, numbers, "the name of an actuator")]]
         if actuator.name in commanded:
             raise InputError(f'the actuator "{actuator.name}" is given twice; leave one of its coordinates out.')
         try:
@@ -146,11 +146,11 @@ def _placed_actuators(system: System, coordinates: Mapping[str, float | str], ma
     return driven
 
 
-def _names(system: System) -> dict[str, Actuator]:
-    """The actuators by all their names: that of the leg where it has one actuator, and their own."""
+def actuator_numbers(system: System) -> dict[str, int]:
+    """Numbers of the actuators by all their names: those of legs that have one actuator, then the actuators' own."""
     legs = [actuator.leg for actuator in system.actuators]
-    alone = {actuator.leg: actuator for actuator in system.actuators if legs.count(actuator.leg) == 1}
-    return {**alone, **{actuator.name: actuator for actuator in system.actuators}}
+    alone = {leg: number for number, leg in enumerate(legs) if legs.count(leg) == 1}
+    return {**alone, **{actuator.name: number for number, actuator in enumerate(system.actuators)}}
 
 
 def _judged_pose(machine: Machine, mode: AssemblyMode) -> ForwardPose:

@@ -17,6 +17,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import POSE
 from kinetostat.spec.errors import InputError, shorten
 from kinetostat.spec.fields import Quantity, quantities
+from kinetostat.studies.assembly_modes import actuator_numbers
 from kinetostat.studies.csv_columns import GivenColumn, columns_of
 from kinetostat.studies.poses import Where, read_columns
 from kinetostat.units import UnitError
@@ -287,13 +288,18 @@ def _from_actuators(machine: Machine, columns: Sequence[GivenColumn], where: Whe
     """The poses of the drawn machine where its actuators are commanded, by leaf path, SI [n]."""
     system = system_of(machine)
     goals = np.tile([float(actuator.coordinate) for actuator in system.actuators], (len(columns[0].entries), 1))
-    number_by_name = {name: n for n, actuator in enumerate(system.actuators) for name in (actuator.name, actuator.leg)}
+    number_by_name = actuator_numbers(system)
+    column_of_actuator: dict[int, str] = {}
     for column in columns:
         name = _name_in_group(column)
         if name not in number_by_name:
-            known = ", ".join(f"actuator.{actuator.leg}" for actuator in system.actuators)
-            raise InputError(f"there is no column {column.name}; choose from {known}.")
+            first_names = {number: known for known, number in reversed(number_by_name.items())}
+            choices = ", ".join(f"actuator.{first_names[number]}" for number in sorted(first_names))
+            raise InputError(f"there is no column {column.name}; choose from {choices}.")
         number = number_by_name[name]
+        if number in column_of_actuator:
+            raise InputError(f"{column.name} and {column_of_actuator[number]} are one actuator; leave one of them out.")
+        column_of_actuator[number] = column.name
         goals[:, number] = _numbers(column, system.actuators[number].kind, where)
     poses, placed = poses_at(system, goals)
     if not placed.all():
