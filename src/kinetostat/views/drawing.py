@@ -6,7 +6,7 @@ Geometry comes from the configuration alone.
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -258,7 +258,7 @@ def add_overlay_legend(figure: Figure, names: tuple[str, str], setting: str, sla
         setting: lines on where the machine is, and how much larger its motions are drawn.
         slack: whether dashed legs are explained as well.
     """
-    styles = [(names[0], UNMOVED_COLOUR, "-"), (names[1], MOVED_COLOUR, "-")]
+    styles: list[tuple[str, str, Any]] = [(names[0], UNMOVED_COLOUR, "-"), (names[1], MOVED_COLOUR, "-")]
     styles += [("slack", SLACK_COLOUR, "--")] if slack else []
     legend = figure.legend(
         handles=[Line2D([], [], color=colour, linestyle=dash, label=text) for text, colour, dash in styles],

@@ -92,7 +92,7 @@ WIDTH_ALONE, WIDTH_AMONG_OTHERS, CUT_HEIGHT, SQUARE_HEIGHT = 4.6, 2.6, 0.9, 0.85
 without numbers, in widths of the panel."""
 ROOM_BESIDE_CUTS, SOLID_SIZE = (0.3, 0.9), (5.2, 4.8)
 """Width of the margins of cuts and height of their title and legend; size of the figure of a solid; inches."""
-PATCH_EDGE = {"edgecolor": "#888888", "linewidth": 0.4}
+PATCH_EDGE: dict[str, Any] = {"edgecolor": "#888888", "linewidth": 0.4}
 """Thin grey edge of the colours in a legend: a pale one is seen on white."""
 SHADE = 0.24
 """Share of the brightness that depends on how a surface faces the light: colours still tell the quantity."""
