@@ -261,12 +261,12 @@ def functions_of(machine: Machine, inputs: Sequence[str], outputs: Sequence[str]
     chosen = [choice(name, [leaf for leaf in numbers if leaf not in pose], "--inputs") for name in inputs]
     wanted = [choice(name, [q for q, row in QUANTITIES.items() if not row.cut], "--outputs") for name in outputs]
     paths = tuple(dict.fromkeys([*pose, *chosen]))
-    acting = any(value or path in paths for path, value in numbers.items() if LOADS.intersection(path.split(".")))
-    rests = acting and cut_machine(machine, paths) is not None
-    needing = [name for name in wanted if not _has_program(machine, paths, name, rests)]
-    if needing:
+    is_loaded = any(value or path in paths for path, value in numbers.items() if LOADS.intersection(path.split(".")))
+    rests = is_loaded and cut_machine(machine, paths) is not None
+    lacking = [name for name in wanted if not _has_program(machine, paths, name, rests)]
+    if lacking:
         raise InputError(
-            f"{needing[0]} has no program for {machine.name}: nothing loads it, or its equations cannot be reduced to "
+            f"{lacking[0]} has no program for {machine.name}: nothing loads it, or its equations cannot be reduced to "
             "few coordinates; leave it out of --outputs, or give the machine a load."
         )
     if machine.loaded and not rests:  # what no program brings to rest is the free machine in all of them

@@ -57,8 +57,8 @@ class PosePath:
         pose: coordinates of the pose by name, m or rad [n].
         rates: rates of these coordinates, per second [n].
         accelerations: their second rates, per second squared [n].
-        loads: forces and moments on the platform that the motion says, by leaf path, N or N·m [n]; others are those of
-            the machine.
+        loads: forces and moments on the platform along the motion, by leaf path, N or N·m [n]; those that are not
+            listed are the machine's.
     """
 
     pose: Mapping[str, Array]
@@ -185,8 +185,8 @@ class RigidForm:
     Attributes:
         machine: the machine at the pose at which its telescopic legs have their mass.
         plan: which motions there are.
-        masses: masses of its links, kg; empty for those at each pose, which a machine written leg by leg has in its
-            file, and a machine without such masses need not be given.
+        masses: masses of its links at this pose, kg, which they keep; empty if no link has one, or if the machine is
+            written leg by leg: its masses are then those of its file at every pose.
     """
 
     machine: Machine
@@ -216,10 +216,10 @@ def forces_on_path(form: RigidForm, path: PosePath, joints: bool = False, compil
         compiled: whether by machine code; if None, where there are many points.
     """
     state = MachineState(form.machine)
-    drive_count, joint_count = len(form.at(state).rigid.drives), len(joints_of(state.configuration)) if joints else 0
     by_program = path.size >= COMPILED_FROM if compiled is None else compiled
     rows, status = (_rows_by_program if by_program else _rows_by_columns)(form, path, joints)
-    return PathForces.of_rows(rows, status, drive_count, joint_count)
+    joint_count = len(joints_of(state.configuration)) if joints else 0
+    return PathForces.of_rows(rows, status, len(form.at(state).rigid.drives), joint_count)
 
 
 def _rows_by_columns(form: RigidForm, path: PosePath, joints_too: bool) -> tuple[Array, Codes]:
@@ -256,6 +256,7 @@ def _run_program(form: RigidForm, path: PosePath, joints_too: bool, closed: bool
     recipe = recipe_of(motion_of, kind, shape, plan=form.plan, links=links, joints_too=joints_too, closed=closed)
     program = program_of(recipe)
     program_inputs = program_columns(machine, shape, varying, path.size, closed)
+    # In the order of the pose, with which `path.columns` begin.
     program_inputs += [
         np.ascontiguousarray(part[name], dtype=float) for part in (path.rates, path.accelerations) for name in path.pose
     ]

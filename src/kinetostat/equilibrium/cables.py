@@ -328,7 +328,7 @@ def _straight_cables(machine: Machine, signs: tuple[float, ...], count: int) -> 
     wrench = of_scalars(load_on_platform(machine, platform).components(), count)
     box = np.abs(stacked_columns([*table.moment_box, *table.force_box], count))
     wrench[:, :3], box[:, :3] = wrench[:, :3] / length, box[:, :3] / length
-    least, most = (stacked_columns([getattr(load, f"{end}_tension")], count)[:, 0] for end in ("min", "max"))
+    least, most = stacked_columns([load.min_tension, load.max_tension], count).T
     components = machine.family.components
     springs = [step.element.springs[0] for leg in chains.legs for step in leg if step.element.springs]
     return Cables(

@@ -162,12 +162,15 @@ def _without_spin(leg: ElasticLeg) -> ElasticLeg:
             size=leg.size - 1,
         ),
         springs=tuple(leg.springs[number] for number in kept),
+        stiffness=leg.stiffness[:, kept],
+        preload=leg.preload[:, kept],
+        rotors=leg.rotors[:, kept],
+        dampers=leg.dampers[:, kept],
         sign=leg.sign[kept],
         idle=np.zeros((len(leg.idle), len(kept), len(kept))),
         masses=replace(leg.masses, carried=carried),
         motion_counts=tuple(number - (number > turns[2]) for number in leg.motion_counts),
         spin=None,
-        **{name: getattr(leg, name)[:, kept] for name in ("stiffness", "preload", "rotors", "dampers")},
     )
 
 
@@ -304,13 +307,8 @@ def wrench_of_rods(pulls: Sequence[RodPull], weights: Row) -> tuple[Array, Array
     ends = _sum(weighted_ends)
     starts = _sum([pull.base_point * pull.force_density for pull in pulls])
     # S, the sum of c a b^T: its antisymmetric part is the moment, and the whole says how the moment turns.
-    outer = [
-        [
-            total([getattr(a, i) * getattr(p.base_point, j) for a, p in zip(weighted_ends, pulls, strict=True)])
-            for j in "xyz"
-        ]
-        for i in "xyz"
-    ]
+    pairs = [(a.components(), pull.base_point.components()) for a, pull in zip(weighted_ends, pulls, strict=True)]
+    outer = [[total([a[i] * b[j] for a, b in pairs]) for j in range(3)] for i in range(3)]
     moment = [outer[i][j] - outer[j][i] for i, j in ((1, 2), (2, 0), (0, 1))]
     trace, density = outer[0][0] + outer[1][1] + outer[2][2], total([pull.force_density for pull in pulls])
     # The weighted dyads, and the geometric part [tr(S) 1 - S, [sum c b]x; -[sum c a]x, (sum c) 1].
@@ -325,6 +323,7 @@ def wrench_of_rods(pulls: Sequence[RodPull], weights: Row) -> tuple[Array, Array
 
 
 def _sum(vectors: Sequence[Vector]) -> Vector:
+    """Return the sum of vectors, component by component; zero of none."""
     if not vectors:
         return ZERO
     return Vector(*(total(list(parts)) for parts in zip(*(v.components() for v in vectors), strict=True)))

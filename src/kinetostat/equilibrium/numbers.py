@@ -60,8 +60,8 @@ def states_of_rest(state: MachineState) -> States:
     status[rows], stable = Status.NO_REST, rows[settled[stability.stable]]
     status[stable] = Status.OK
     loads = [(spring, np.full(count, np.nan)) for spring in placed.mechanism.driven]
-    for (_, whole), (_, carried) in zip(loads, actuator_loads_at_rest(equations), strict=True):
-        whole[stable] = carried[stability.stable]
+    for (_, at_all_points), (_, at_rest_points) in zip(loads, actuator_loads_at_rest(equations), strict=True):
+        at_all_points[stable] = at_rest_points[stability.stable]
     status[stable] = status_with_load_limits(state.machine, free, loads, status)[stable]
     return States(status, stable, equations, stability, tuple(loads))
 
@@ -153,10 +153,10 @@ def loaded_numbers(
     numbers = _numbers_at_rest(equations, np.array(state.machine.family.components)) | {"factor": stability.factor}
     numbers |= {name: compute(equations) for name, compute in (further or {}).items()}
     for name, values in numbers.items():
-        whole = result.setdefault(name, np.full((count, *values.shape[1:]), np.nan))
-        whole[states.rows] = values[stability.stable]
-    carried = np.array([load for _, load in states.loads]).reshape(-1, count).T
-    return result | greatest_loads(states.loads) | {"drive_loads": carried}, states.status
+        at_all_points = result.setdefault(name, np.full((count, *values.shape[1:]), np.nan))
+        at_all_points[states.rows] = values[stability.stable]
+    drive_loads = np.array([load for _, load in states.loads]).reshape(-1, count).T
+    return result | greatest_loads(states.loads) | {"drive_loads": drive_loads}, states.status
 
 
 def _numbers_at_rest(equations: Balance, components: Integers) -> dict[str, Array]:

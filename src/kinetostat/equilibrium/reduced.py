@@ -176,9 +176,9 @@ class Reduced:
         at_rest: Scalar = int(Status.OK)
         if "actuators" in wanted:
             loads = tangent.actuator_loads()
-            by_name = {spring.name: load for spring, load in loads}
+            load_by_name = {spring.name: load for spring, load in loads}
             result |= greatest_loads(loads)
-            result["drive_loads"] = [by_name[spring.name] for spring in self.cut.mechanism.driven]
+            result["drive_loads"] = [load_by_name[spring.name] for spring in mechanism.driven]
             at_rest = status_with_load_limits(self.machine, response, loads, at_rest)
         code = where(sure, at_rest, int(Status.NOT_CONVERGED))
         status = where(response.place_status > Status.OK + 0.5, response.place_status, code)

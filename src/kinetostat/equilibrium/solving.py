@@ -6,7 +6,6 @@ Source: theory section 12; theory (40) for stability. Units, axes and origin are
 from dataclasses import replace
 from enum import IntEnum
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 
@@ -196,11 +195,14 @@ def with_share(mechanism: Mechanism, share: float | Array, preload: float | None
         return np.asarray((values.T * factor).T)
 
     of_preload = share if preload is None else preload
-    legs = tuple(replace(leg, preload=scale(leg.preload, of_preload)) for leg in mechanism.legs)
-    loads: dict[str, Any] = {
-        name: scale(getattr(mechanism, name), share) for name in ("wrench", "forces", "gravity", "growth")
-    }
-    return replace(mechanism, legs=legs, **loads)
+    return replace(
+        mechanism,
+        legs=tuple(replace(leg, preload=scale(leg.preload, of_preload)) for leg in mechanism.legs),
+        wrench=scale(mechanism.wrench, share),
+        forces=scale(mechanism.forces, share),
+        gravity=scale(mechanism.gravity, share),
+        growth=scale(mechanism.growth, share),
+    )
 
 
 def newton_step(equations: Balance, loaded: bool = True) -> Array:

@@ -282,7 +282,7 @@ def _loaded_mechanism(
     mechanism = mechanisms.mechanism_of(machine, configuration, joints, count)
     check_loads(machine, count, mechanism.weighs)
     load = machine.tables["load"]
-    least, most = (stacked_columns([getattr(load, f"{end}_tension")], count)[:, 0] for end in ("min", "max"))
+    least, most = stacked_columns([load.min_tension, load.max_tension], count).T
     if np.isinf(least).all() and np.isinf(most).all():
         return mechanism, np.ones(count, dtype=bool)
     least = np.where(np.isinf(least), 0.0, least)

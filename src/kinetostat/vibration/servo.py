@@ -92,8 +92,11 @@ def servo_loops(state: MachineState) -> dict[str, ServoLoop]:
     machine, loops = state.machine, {}
     for spring in driven_springs(state.configuration):
         gains, drive = (numbers_of_drive(machine, table, spring) for table in ("servo", "drives"))
-        for name, example in (("position_gain", '"50 1/s"'), ("velocity_gain", '"0.5 N*m*s/rad"')):
-            if not getattr(gains, name):
+        for name, gain, example in (
+            ("position_gain", gains.position_gain, '"50 1/s"'),
+            ("velocity_gain", gains.velocity_gain, '"0.5 N*m*s/rad"'),
+        ):
+            if not gain:
                 raise InputError(
                     f"servo.{name} of {machine.name} is 0, so that the motor of {name_of(spring)} is not held; write "
                     f"{name} = {example}, say, in the table [servo]."
