@@ -160,7 +160,7 @@ def _read_argument(value: Any, parameter: inspect.Parameter) -> Any:
     """
     kind, name = parameter.annotation, parameter.name
     if any(_is_of_lists(part) for part in _alternatives(kind)):
-        value = _entries_read(value)
+        value = _as_python_row(value)
     misfit = _misfit(value, kind, name)
     if misfit is not None:
         optional = ", or leave it out" if value is None and parameter.default is not parameter.empty else ""
@@ -168,7 +168,7 @@ def _read_argument(value: Any, parameter: inspect.Parameter) -> Any:
     return _number_of_python(value)
 
 
-def _entries_read(value: Any) -> Any:
+def _as_python_row(value: Any) -> Any:
     """Return a generator or an array as a list, lists and tuples with Python's numbers, and all else as it is."""
     if isinstance(value, tuple):
         return tuple(map(_number_of_python, value))

@@ -34,6 +34,14 @@ LEAST_SHARE = 1e-6
 """Share of its greatest value that a branch's sign needs at the home pose: else the leg stands between two branches."""
 
 
+class JointReach(NamedTuple):
+    """The movement of a joint to a distance, m or a turn, NaN where there is none; and the ends of the distances, m."""
+
+    amount: Scalar | Turn
+    nearest: Scalar
+    farthest: Scalar
+
+
 class _ClosedArm(NamedTuple):
     """The three joints before the ball, in closed form.
 
@@ -124,15 +132,15 @@ class BallLeg:
         fixed = pair[0].pivot
         end = goal - fixed
         square = _square(end)
-        amount, limits = to_distance(single, centre, centre, fixed, square, self.aligned)
-        single_motion = single.motion_by(amount)[1]
+        reach = to_distance(single, centre, centre, fixed, square, self.aligned)
+        single_motion = single.motion_by(reach.amount)[1]
         shrink = reciprocal(sqrt(square))
         start = single.axis * self.aligned if self.aligned else (single_motion.apply(centre) - fixed) * shrink
         turns, gap = self._pair(pair, start, end * shrink, centre - fixed)
         pair_motion = _placement_of(turns[1]).motion
         arm = pair_motion @ single_motion
-        amounts = [*turns, _with_placement(amount, single, pair_motion, arm)]
-        return _ClosedArm(amounts, arm, Closure(self.leg, sqrt(square), *limits), gap)
+        amounts = [*turns, _with_placement(reach.amount, single, pair_motion, arm)]
+        return _ClosedArm(amounts, arm, self._closure(square, reach), gap)
 
     def _close_single_first(self, movers: Sequence[Joint], centre: Vector, goal: Vector) -> _ClosedArm:
         """The single joint carries the pair; seen from the pair, it puts the goal at the distance of the ball."""
@@ -140,15 +148,19 @@ class BallLeg:
         fixed = pair[0].pivot
         start = centre - fixed
         square = _square(start)
-        backward_amount, limits = to_distance(single, goal, centre, fixed, square)
-        end = single.motion_by(backward_amount)[1].apply(goal) - fixed
+        reach = to_distance(single, goal, centre, fixed, square)
+        end = single.motion_by(reach.amount)[1].apply(goal) - fixed
         shrink = reciprocal(sqrt(square))
         turns, gap = self._pair(pair, start * shrink, end * shrink, centre - fixed)
-        amount = _opposite(backward_amount)
+        amount = _opposite(reach.amount)  # seen from the base
         single_motion = single.motion_by(amount)[1]
         turns = [_displaced_turn(single_motion, turn) for turn in turns]
         amounts = [_with_placement(amount, single, single_motion, single_motion), *turns]
-        return _ClosedArm(amounts, _placement_of(turns[1]).motion, Closure(self.leg, sqrt(square), *limits), gap)
+        return _ClosedArm(amounts, _placement_of(turns[1]).motion, self._closure(square, reach), gap)
+
+    def _closure(self, square: Scalar, reach: JointReach) -> Closure:
+        """The condition for the single joint to reach a distance with this square, m²."""
+        return Closure(self.leg, sqrt(square), reach.nearest, reach.farthest)
 
     def _pair(self, pair: Sequence[Joint], start: Vector, end: Vector, home: Vector) -> tuple[list[Turn], Scalar]:
         """Turns of the pair that take one unit vector to another (theory (74)), and the square of what they miss.
@@ -258,7 +270,7 @@ def _place_at(axis: Vector, point: Vector, before: Displacement, after: Displace
 
 def to_distance(
     joint: Joint, point: Vector, home: Vector, centre: Vector, square: Scalar, aligned: float = 0.0
-) -> tuple[Scalar | Turn, tuple[Scalar, Scalar]]:
+) -> JointReach:
     """Find how far a joint must move for a point to lie at a distance from a centre (theory (73)).
 
     Args:
@@ -267,19 +279,16 @@ def to_distance(
         home: the point at the home pose, where the joint need not move: this chooses one of the two solutions.
         centre: the centre, m.
         square: the square of the distance, m².
-        aligned: 1 if the joint slides along the line from the centre to the point, -1 if against it.
-
-    Returns:
-        The movement, m or a turn, NaN where there is none; and the least and the greatest distance that there are, m.
+        aligned: 1 if the joint slides along the line from the centre to the point, -1 if against it; 0 for all others.
     """
     span = point - centre
     if joint.point is None:
         along = span.dot(joint.axis)
         if aligned:
-            return sqrt(square) * aligned - along, (0.0, math.inf)
+            return JointReach(sqrt(square) * aligned - along, 0.0, math.inf)
         aside = _square(span.across(joint.axis))
         root = sqrt(square - aside)
-        return root * _sign((home - centre).dot(joint.axis)) - along, (sqrt(aside), math.inf)
+        return JointReach(root * _sign((home - centre).dot(joint.axis)) - along, sqrt(aside), math.inf)
     arm = (point - joint.point).across(joint.axis)
     middle = span - arm
     a, b = middle.dot(arm), middle.dot(joint.axis.cross(arm))
@@ -290,7 +299,7 @@ def to_distance(
     shrink = reciprocal(size)
     wide = 2.0 * sqrt(size)
     nearest = sqrt(where(mean > wide, mean - wide, 0.0))
-    return Turn((a * d + b * root) * shrink, (b * d - a * root) * shrink), (nearest, sqrt(mean + wide))
+    return JointReach(Turn((a * d + b * root) * shrink, (b * d - a * root) * shrink), nearest, sqrt(mean + wide))
 
 
 def _bend(joint: Joint, home: Vector, centre: Vector) -> Scalar:
