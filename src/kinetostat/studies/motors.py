@@ -35,6 +35,8 @@ from kinetostat.units import UnitError
 
 CATALOGUE = Path(__file__).with_name("catalogue.toml")
 """The catalogue that comes with kinetostat."""
+SOURCE = "source"
+"""Field of an entry of a catalogue that says where its numbers are printed."""
 
 
 @table
@@ -96,8 +98,6 @@ class ScrewRating:
         return self.inertia + (self.shaft or solid) * self.length
 
 
-SOURCE = "source"
-"""Field of an entry that says where its numbers are printed."""
 TABLES: Mapping[str, Any] = {"motors": MotorRating, "gears": GearRating, "screws": ScrewRating}
 """Tables of a catalogue, with the class of their entries; `Catalogue` has a field of each name."""
 
