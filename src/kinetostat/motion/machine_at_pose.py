@@ -33,13 +33,14 @@ from kinetostat.motion.forces import (
 from kinetostat.motion.rates import (
     BodyMotion,
     Coordinates,
-    LegMotion,
     MachineMotion,
     PoseRates,
     angles_of,
     coordinates_of,
+    leg_from_rest,
     machine_motion,
     motion_along,
+    motion_from_rest,
     placed_platform,
     platform_motion,
 )
@@ -239,8 +240,8 @@ def loads_by_acceleration(placed: MachineAtPose) -> list[Twist]:
     rigid, shrink = placed.rigid, 1.0 / placed.rigid.length
     rows: list[list[Scalar]] = [[0.0] * 6 for _ in rigid.drives]
     for way in placed.statics.ways:
-        motion = machine_motion(rigid, BodyMotion(Twist.of(way), NO_MOTION))
-        forces = drive_forces(rigid, placed.statics, inertia(rigid, _from_rest(motion)))
+        from_rest = motion_from_rest(rigid, Twist.of(way))
+        forces = drive_forces(rigid, placed.statics, inertia(rigid, from_rest))
         rows = [[a - b * f for a, b in zip(row, way, strict=True)] for row, f in zip(rows, forces, strict=True)]
     levers = [1.0 if drive.slides else rigid.length for drive in rigid.drives]
     return [
@@ -251,15 +252,7 @@ def loads_by_acceleration(placed: MachineAtPose) -> list[Twist]:
 
 def _from_rest(motion: MachineMotion) -> MachineMotion:
     """Return the motion from rest whose accelerations are the rates of another one."""
-    legs = tuple(
-        LegMotion(
-            [0.0] * len(leg.rates),
-            leg.rates,
-            tuple(BodyMotion(NO_MOTION, body.twist) for body in leg.bodies),
-            NO_MOTION,
-        )
-        for leg in motion.legs
-    )
+    legs = tuple(leg_from_rest(leg.rates, [body.twist for body in leg.bodies]) for leg in motion.legs)
     return MachineMotion(BodyMotion(NO_MOTION, motion.platform.twist), legs)
 
 

@@ -175,6 +175,25 @@ def machine_motion(
     return MachineMotion(platform, tuple(legs))
 
 
+def motion_from_rest(machine: RigidMachine, acceleration: Twist) -> MachineMotion:
+    """Return the motion of a machine at rest that begins with an acceleration of the platform: no screw moves yet.
+
+    Args:
+        machine: the machine.
+        acceleration: change of the platform's twist.
+    """
+    changes = [[_rate_by(row, acceleration) for row in leg.rates_by_twist] for leg in machine.legs]
+    pairs = zip(machine.legs, changes, strict=True)
+    legs = tuple(leg_from_rest(change, _sums_along(leg, leg.screws, change)) for leg, change in pairs)
+    return MachineMotion(BodyMotion(NO_MOTION, acceleration), legs)
+
+
+def leg_from_rest(change: Row, body_changes: Sequence[Twist]) -> LegMotion:
+    """Return the motion of a leg at rest of whose coordinates and bodies only the accelerations are not zero."""
+    bodies = tuple(BodyMotion(NO_MOTION, body_change) for body_change in body_changes)
+    return LegMotion([0.0] * len(change), change, bodies, NO_MOTION)
+
+
 @dataclass(frozen=True)
 class Coordinates:
     """The coordinates of a pose that does not say where the platform is wholly; legs say the rest.
