@@ -171,7 +171,7 @@ def test_a_folder_gets_figure_and_data(tmp_path, capsys):
 
 def test_out_of_reach_there_is_no_answer(capsys):
     assert main(["sensitivity", MACHINE, "--set", "pose.z=5 m"]) == 1
-    assert "span 5 m" in capsys.readouterr().err
+    assert "span 5000 mm" in capsys.readouterr().err
     assert main(["sensitivity", MACHINE, "--set", "pose.z=5 m", "--json"]) == 1
     assert json.loads(capsys.readouterr().out)["parameters"] == []
 
