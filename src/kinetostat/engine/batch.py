@@ -158,6 +158,7 @@ def _function(
     way: "loaded.Way | None" = None,
     judged: bool = True,
 ) -> Function:
+    """Return the function of `function_of`, kept by the identity of the machine; no way for machines that are free."""
     method = partial(slab_fill, judged=judged) if way is None else partial(loaded.loaded_fill, way=way)
     fill = by_free_springs(machine.value, paths, quantities, method)
     return Function(fill, paths, len(quantities), way.slab if way else None)

@@ -346,8 +346,8 @@ def plan_for(machine: Machine, names: Iterable[str], varying: Iterable[str] = ()
         InputError: quantities need them, and the machine has no place at the pose of its file.
     """
     damping, varying, names = machine.tables["damping"], {*varying}, [*names]
-    rubs = any(path in varying or getattr(damping, path.partition(".")[2]) for path in FRICTION_OF_JOINTS)
-    if not needs_motion(names) or not (needs_masses(names) or rubs):
+    has_friction = any(path in varying or getattr(damping, path.partition(".")[2]) for path in FRICTION_OF_JOINTS)
+    if not needs_motion(names) or not (needs_masses(names) or has_friction):
         return None
     stiff = {leaf for parameter in parameters(machine.family) if parameter.quantity.stiff for leaf in parameter.leaves}
     free = [path for path in varying if path in stiff and values(machine)[path] == 0.0]
@@ -407,6 +407,7 @@ def traced_joints(traced: TracedMachine, closed: bool) -> tuple[Joints | None, t
 
 
 def _weighted_sum(response: Response, weights: Weights) -> Scalar:
+    """Return a weighted sum of quantities of a response."""
     value: Scalar = 0.0
     for name, weight in weights:
         value = value + float(weight) * QUANTITIES[name].value(response)

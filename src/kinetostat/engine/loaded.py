@@ -117,6 +117,7 @@ def loaded_fill(machine: Machine, paths: Sequence[str], quantities: Sequence[str
     modal = [place for place, name in enumerate(quantities) if QUANTITIES[name].modal]
 
     def with_status(columns: Mapping[str, Array], results: Array, status: Codes) -> None:
+        """Evaluate a slab, see `Fill`; poses whose vibrations remain unknown are SINGULAR."""
         fill(columns, results, status)
         # Springs more than 1e12 times as stiff as others leave no digit of the softest motion.
         hidden = np.isnan(results[modal]).any(axis=0) & (status == Status.OK)

@@ -209,6 +209,7 @@ def _secret(folder: int, make: bool = False) -> bytes:
 
 
 def _exists(folder: int, name: str) -> bool:
+    """Tell whether the folder has a file of this name."""
     try:
         os.stat(name, dir_fd=folder, follow_symlinks=False)
     except FileNotFoundError:
