@@ -51,8 +51,8 @@ else:
 
 MOST_MODES = 6
 """Excited modes that are named: the lowest ones move the tool most."""
-FIGURE_WIDTH, PANEL_HEIGHT, ROOM_FOR_TITLE = 6.6, 1.7, 0.9
-"""Width of a figure over time, height of each of its panels, and of title and notes, inches."""
+PANEL_HEIGHT, ROOM_FOR_TITLE = 1.7, 0.9
+"""Height of a panel over time, and of title and notes, inches."""
 HEIGHT_OF_PARTS = 3.2
 """Height of the figure of the parts of one force, whose curves cross each other, inches."""
 ZERO_COLOUR = "#b0b0b0"
@@ -194,7 +194,7 @@ def over_time_figure(answer: DriveLoads, title: str = "{}: drives along the moti
     """Draw speed, force and power of all drives over time."""
     contents = list(_contents_over_time(answer, curves_of(answer)))
     with figures.new_figure(
-        (FIGURE_WIDTH, ROOM_FOR_TITLE + PANEL_HEIGHT * len(contents)), title.format(answer.machine.name)
+        (figures.PAGE_WIDTH, ROOM_FOR_TITLE + PANEL_HEIGHT * len(contents)), title.format(answer.machine.name)
     ) as figure:
         panels = list(figure.subplots(len(contents), 1, sharex=True, squeeze=False).flat)
         for panel, content in zip(panels, contents, strict=True):
@@ -239,7 +239,7 @@ def parts_figure(answer: DriveLoads, name: str, title: str = "{}: parts of the f
     curves, times = curves_of(answer), answer.motion.times
     k = [drive.name for drive in answer.drives].index(name)
     scale = answer.machine.display.scale(answer.drives[k].unit)
-    with figures.new_figure((FIGURE_WIDTH, HEIGHT_OF_PARTS), title.format(answer.machine.name, name)) as figure:
+    with figures.new_figure((figures.PAGE_WIDTH, HEIGHT_OF_PARTS), title.format(answer.machine.name, name)) as figure:
         panel = figure.add_subplot()
         for colour, part, force in zip(figures.COLOURS, PARTS, curves.parts[k], strict=False):
             if np.any(force):

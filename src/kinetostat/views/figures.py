@@ -73,6 +73,8 @@ NOTE_CHARACTERS_PER_INCH, TITLE_CHARACTERS_PER_INCH = 19, 12
 """Characters of the notes below a figure and of its title that fit into an inch, at the sizes of both."""
 MOST_COLUMNS = 3
 """Panels side by side, as a rule at most: with more, a figure would be wider than a page."""
+PAGE_WIDTH = 6.6
+"""Width of a figure whose panels stand below each other, inches: that of the text of a page."""
 PAGE_MARGIN = 0.04
 """Room around a figure that stands in a page, inches: the page has margins of its own."""
 

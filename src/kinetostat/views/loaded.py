@@ -47,9 +47,8 @@ SIGNS = (
     "or flexure it is positive along the axis that the file gives, so that mirrored copies of a leg differ in sign."
 )
 """Meaning of the signs of loads, which stands beside their tables."""
-CURVES_WIDTH, CURVES_HEIGHT, ROOM_FOR_TITLE = 6.6, 1.8, 0.7
-"""Width of the figure of a growing load, with the legends to the right of its panels; height of each panel; and room
-for title and labels, inches."""
+CURVES_HEIGHT, ROOM_FOR_TITLE = 1.8, 0.7
+"""Height of a panel over a growing load, whose legend stands to its right, and of title and labels, inches."""
 BARS_WIDTH, ROOM_FOR_SCALE = 4.6, 0.6
 """Width of the panels of bars beside the names of legs, and height of the labels below each panel, inches."""
 BAR_HEIGHT, BAR_SHARE = 0.24, 0.6
@@ -246,7 +245,7 @@ def load_figure(state: LoadedState, title: str = "{}: under growing load") -> "F
     turning = {spring.name: spring.turning for spring in state.springs}
     kinds = [turns for turns, _ in KINDS_OF_LOADS if turns in turning.values()]
     with figures.new_figure(
-        (CURVES_WIDTH, ROOM_FOR_TITLE + CURVES_HEIGHT * (2 + len(kinds))),
+        (figures.PAGE_WIDTH, ROOM_FOR_TITLE + CURVES_HEIGHT * (2 + len(kinds))),
         title.format(machine.name),
         setting_of(machine, []),
         "thin lines: to first order" if state.linear is not None else "",

@@ -16,7 +16,7 @@ from kinetostat.vibration.receptance import ASSUMED_RATIO
 from kinetostat.views.data_forms import finite_or_none
 from kinetostat.views.question import FIRST_FIELDS, Axis, Description, Drawing, Field, Lines, Option, Question
 from kinetostat.views.tables import FittedTable, numeric_table
-from kinetostat.views.vibration import tool_sentence
+from kinetostat.views.vibration import TOOL_RECEPTANCE, VIBRATING_LOADED, tool_sentence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -160,13 +160,9 @@ LOBES_QUESTION = Question(
         Option(
             "over", "text", 'a range of poses, all of which must be stable: "x=-10 cm:10 cm:5"', "RANGE", (), many=True
         ),
-        Option(
-            "tool_receptance",
-            "file",
-            "a CSV file with the receptance of a free tool and holder, which are coupled to the tool point",
-        ),
+        TOOL_RECEPTANCE,
     ),
-    loaded="vibrations about the state of rest under the loads, with tensions and weights",
+    loaded=VIBRATING_LOADED,
     output="lobes.json, lobes.nc and the figure",
     slow="cutting",
     reports_progress=True,

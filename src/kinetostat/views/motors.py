@@ -48,13 +48,17 @@ PEAK_OPACITY, CONTINUOUS_OPACITY = 0.15, 0.3
 """Opacity of the torque that a motor may give for a short while and for ever: where both lie, it is dark."""
 DIAGRAM_SIZE, ROOM_BESIDE_DIAGRAMS = (3.3, 2.7), (1.4, 0.9)
 """Width and height of the diagram of a motor; further width, of the legend, and height, of title and notes; inches."""
-WIDTH_ALONE, HEIGHT_ALONE = 6.6, 3.4
-"""Width of the figure of one diagram with its legend, and height of the diagram, inches."""
+HEIGHT_ALONE = 3.4
+"""Height of a diagram that has a figure to itself, inches."""
+CLOUD_LOOK: dict[str, Any] = {"linewidth": 0.7, "alpha": 0.6}
+"""Look of the line through all points of a motion, which crosses itself often: thinner and paler than an outline."""
+OUTLINE_LOOK: dict[str, Any] = {"linewidth": 1.2}
+"""Look of the outline of what a speed in all directions asks for."""
 LIMIT_POINTS = 200
 """Points of the line of a limit over the speed: its corners stand where they are to a pixel or two."""
 PER_MINUTE = 30.0 / np.pi
 """Turns per minute of 1 rad/s."""
-MOST_LEGEND = 8
+MOST_NAMED_DRIVES = 8
 """Drives that a legend names at most: a longer one would be taller than the figure."""
 PEAK_MARK, RMS_MARK = "\N{MULTIPLICATION SIGN} peak", "\N{BLACK CIRCLE} RMS"
 """Meaning of the marks in a speed-torque diagram."""
@@ -143,14 +147,14 @@ def draw_torque_over_speed(panel: "Axes", answer: DriveLoads, rotary: bool) -> N
     curves, times = curves_of(answer), answer.motion.times
     scale = answer.machine.display.scale(load_unit(rotary))
     factor = PER_MINUTE if rotary else 1.0
-    width, opacity = (1.2, 1.0) if answer.motion.timeless else (0.7, 0.6)
+    look = OUTLINE_LOOK if answer.motion.timeless else CLOUD_LOOK
     for k, drive in enumerate(answer.drives):
         if drive.rotary is not rotary:
             continue
         colour, torque = figures.colour_of(k), np.abs(curves.motor_torque[k]) * scale.factor
         speed, peak = np.abs(curves.motor_speed[k]) * factor, int(np.argmax(torque))
         line = _most_at_speeds(speed, torque) if answer.motion.timeless else (speed, torque)
-        panel.plot(*line, color=colour, linewidth=width, alpha=opacity)
+        panel.plot(*line, color=colour, **look)
         panel.plot(
             speed[peak], torque[peak], "x", color=colour, markersize=6, markeredgewidth=1.5, zorder=3, clip_on=False
         )
@@ -183,7 +187,7 @@ def name_drives(figure: "Figure", answer: DriveLoads, meaning: str = "") -> None
     """
     pairs = [panel.get_legend_handles_labels() for panel in figure.axes]
     named = {name: handle for handles, names in pairs for handle, name in zip(handles, names, strict=True)}
-    if len(answer.drives) > MOST_LEGEND:
+    if len(answer.drives) > MOST_NAMED_DRIVES:
         named = {}
     if named or meaning:
         figure.legend(
@@ -195,7 +199,7 @@ def name_drives(figure: "Figure", answer: DriveLoads, meaning: str = "") -> None
 def speed_torque_figure(answer: DriveLoads, title: str = "{}: what the motors must give") -> "Figure":
     """Draw the torque of each motor over its speed, with its peak and its root mean square."""
     shown = [rotary for rotary in (True, False) if any(drive.rotary is rotary for drive in answer.drives)]
-    size = WIDTH_ALONE, ROOM_BESIDE_DIAGRAMS[1] + HEIGHT_ALONE * len(shown)
+    size = figures.PAGE_WIDTH, ROOM_BESIDE_DIAGRAMS[1] + HEIGHT_ALONE * len(shown)
     with figures.new_figure(size, title.format(answer.machine.name)) as figure:
         for panel, rotary in zip(figure.subplots(len(shown), 1, squeeze=False).flat, shown, strict=True):
             draw_torque_over_speed(panel, answer, rotary)

@@ -47,8 +47,8 @@ else:
 
 USUAL_QUANTITY = "free_stiffness"
 """Quantity that is computed where nobody names one: what a tool feels."""
-FIGURE_WIDTH, ROOM_FOR_TITLE = 6.6, 0.7
-"""Width of the figure, and height of its title and notes, inches."""
+ROOM_FOR_TITLE = 0.7
+"""Height of title and notes of the figure, inches."""
 QUANTITY_HEIGHT, COORDINATE_HEIGHT = 1.9, 1.25
 """Height of a panel of quantities, and of one of coordinates, which only say where the machine is; inches."""
 STRIP_COLOUR = "#dddddd"
@@ -137,7 +137,7 @@ def path_figure(answer: PoseAnswers, title: str = "{}") -> "Figure":
     """
     quantities, coordinates = _quantity_panels(answer), _coordinate_panels(answer)
     heights = [QUANTITY_HEIGHT] * len(quantities) + [COORDINATE_HEIGHT] * len(coordinates)
-    size = (FIGURE_WIDTH, ROOM_FOR_TITLE + sum(heights))
+    size = (figures.PAGE_WIDTH, ROOM_FOR_TITLE + sum(heights))
     with figures.new_figure(size, title.format(answer.machine.name), *_notes(answer)) as figure:
         panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
         for panel, (label, curves) in zip(panels, quantities + coordinates, strict=True):

@@ -255,6 +255,13 @@ VIBRATION = Description(
     answered=lambda answer: bool(answer.modes),
     files={"modes.csv": "csv", "response.nc": "nc"},
 )
+TOOL_RECEPTANCE = Option(
+    "tool_receptance",
+    "file",
+    "a CSV file with the receptance of a free tool and holder, which are coupled to the tool point",
+)
+VIBRATING_LOADED = "vibrations about the state of rest under the loads, with tensions and weights"
+"""Help on `--loaded` of questions about vibrations."""
 MODES_QUESTION = Question(
     example='kinetostat modes hexapod --set tool.mass="12 kg" -o modes',
     answer=modes,
@@ -286,13 +293,9 @@ MODES_QUESTION = Question(
             metavar="FREQUENCY",
             former=("--to",),
         ),
-        Option(
-            "tool_receptance",
-            "file",
-            "a CSV file with the receptance of a free tool and holder, which are coupled to the tool point",
-        ),
+        TOOL_RECEPTANCE,
         Option("closed_loops", "flag", "the response of the tool with the servo loops of the table [servo] closed"),
     ),
-    loaded="vibrations about the state of rest under the loads, with tensions and weights",
+    loaded=VIBRATING_LOADED,
     output="modes.csv, response.nc and the figures",
 )
