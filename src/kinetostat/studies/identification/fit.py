@@ -22,15 +22,15 @@ from kinetostat.tolerances import FIT_BEGUN, FIT_SETTLED, LEAST_DIVISOR
 Tell = Callable[[int, int, str], None]
 """Receives how far a fit is: rounds done, rounds at most, and a few words."""
 
-OUTLYING = 4.0
+OUTLIER_SIGMAS = 4.0
 """Standard deviations from which a value counts as an outlier: one of 16 000 good ones does."""
 DEVIATION_OVER_MEDIAN = 1.4826
-"""Standard deviation of normal values over the median of their sizes."""
+"""Standard deviation of normal values over the median of their sizes: 1 over the 75 % quantile."""
 MOST_ROUNDS = 20
 """Greatest number of rounds in which the scale of residuals, outliers and unseen combinations settle: few need half."""
 SAME_SPREAD = 0.1
-"""Relative change of the spread of residuals below which it has settled."""
-UNSEEN = 1e-6
+"""Relative change of the spread of residuals below which it has settled: few values lie between 4.0 and 4.4 spreads."""
+UNSEEN_STRENGTH = 1e-6
 """Strength of a combination, as a share of the strongest one, below which it is not seen: round-off is 1e-9."""
 NORMAL_FACTOR = 1.959963984540054
 """Half of the 95 % interval of a normal value over its standard deviation."""
@@ -200,7 +200,7 @@ def _settle(
     settled, rank = False, 0
     for number in range(MOST_ROUNDS):
         if options.robust and not with_loss:
-            kept = np.abs(state.after) < OUTLYING * state.spread
+            kept = np.abs(state.after) < OUTLIER_SIGMAS * state.spread
             settled = settled and bool((kept == state.kept).all())
             state = replace(state, kept=kept)
         seen = _combinations(state.rates[state.kept], options, state.spread)
@@ -236,8 +236,8 @@ def _median_spread(residuals: Array, rates: Array, options: FitOptions) -> float
         return least
     if not options.known:
         strengths = np.linalg.svd(rates, compute_uv=False)
-        has_unseen = len(strengths) < rates.shape[1] or strengths[-1] <= UNSEEN * strengths[0]
-        least = max(options.resolution, UNSEEN * float(strengths[0]) if has_unseen else 0.0)
+        has_unseen = len(strengths) < rates.shape[1] or strengths[-1] <= UNSEEN_STRENGTH * strengths[0]
+        least = max(options.resolution, UNSEEN_STRENGTH * float(strengths[0]) if has_unseen else 0.0)
     return max(DEVIATION_OVER_MEDIAN * float(np.median(np.abs(residuals[affected]))), least)
 
 
@@ -321,7 +321,7 @@ def _combinations(rates: Array, options: FitOptions, spread: float) -> _SeenComb
     prior = unit * np.diag(options.sizes / options.priors)
     _, strengths, directions = np.linalg.svd(np.concatenate([rates, prior]), full_matrices=False)
     weak = np.diag(unit * options.preferred)
-    seen = strengths > np.maximum(UNSEEN * strengths[0], np.linalg.norm(directions @ weak, axis=1))
+    seen = strengths > np.maximum(UNSEEN_STRENGTH * strengths[0], np.linalg.norm(directions @ weak, axis=1))
     order, rank = np.argsort(~seen, kind="stable"), int(seen.sum())
     unseen = np.linalg.qr(weak @ directions[order[rank:]].T)[0]
     return _SeenCombinations(
@@ -422,7 +422,7 @@ def _half_intervals(interval: Array, seen: _SeenCombinations, options: FitOption
     covariance_of_unseen = np.linalg.inv(unseen.T @ np.diag((FULL_PREFERENCE * options.preferred) ** 2) @ unseen)
     deviations = np.sqrt(np.einsum("ui,ij,uj->u", unseen, covariance_of_unseen, unseen)) * options.sizes
     half_intervals = np.hypot(np.sqrt(np.diag(interval)), NORMAL_FACTOR * deviations)
-    half_intervals[np.linalg.norm(unseen, axis=1) > np.sqrt(UNSEEN)] = np.inf
+    half_intervals[np.linalg.norm(unseen, axis=1) > np.sqrt(UNSEEN_STRENGTH)] = np.inf
     return np.asarray(half_intervals)
 
 

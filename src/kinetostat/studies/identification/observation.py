@@ -69,6 +69,7 @@ class Observation:
     row_poses: Integers
     sigma: Array
     measured: Array
+    # Not a part of the constructor, so that a copy with other fields does not take over answers of this one.
     _last_linearisation: dict[bytes, tuple[Array, Array]] = field(init=False, default_factory=dict)
 
     @property
