@@ -120,6 +120,7 @@ def _fields(table: type) -> dict[str, Any]:
 
 QUANTITY = {"type": ["number", "string"]}
 """A number in SI, or text with a unit."""
+# Fields that several tables of a file leg by leg have.
 POINT = {"type": "array", "items": QUANTITY, "minItems": 3, "maxItems": 3}
 DIRECTION = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
 BODIES = {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}
@@ -156,6 +157,7 @@ def _written_file() -> Schema:
 
 
 def _table(properties: Schema, required: list[str] | None = None) -> Schema:
+    """A table that has these fields and no others."""
     return {"type": "object", "properties": properties, "required": required or [], "additionalProperties": False}
 
 

@@ -257,10 +257,8 @@ def with_struts_or_cranks(
         placement = platform_of(geometry, stiffness, pose)
         bars = CrankLinks(geometry.crank_length, geometry.rod_length, stiffness.crank_bending, stiffness.leg_axial)
         # About this axis the crank points to its side if the platform joint is above the base joint, else away from it.
-        axes = [
-            Z_AXIS.cross(side)
-            for side in outward_directions(placement.joints.base, geometry.base_radius, geometry.crank_turn)
-        ]
+        sides = outward_directions(placement.joints.base, geometry.base_radius, geometry.crank_turn)
+        axes = [Z_AXIS.cross(side) for side in sides]
         legs, closures = legs_and_closures(
             crank_leg(f"leg {i}", base, tip, axis, k, bars)
             for i, (base, tip, axis, k) in enumerate(zip(*placement.joints, axes, stiffness.actuator, strict=True), 1)

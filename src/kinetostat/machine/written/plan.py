@@ -56,6 +56,7 @@ MOST_LEGS = 24
 """Legs that a machine may have, with all copies: the work of sharing loads grows with the cube of their number."""
 
 Matrix = tuple[tuple[float, ...], ...]
+"""Rows of a 6x6 matrix, which plans compare and hash; empty where there is none."""
 
 
 @dataclass(frozen=True)
