@@ -147,18 +147,18 @@ def _candidates(number: int, row: LegRow, rows: HomeRows) -> Iterator[tuple[int,
     for place, unit in enumerate(row.units):
         joint = _JointErrors(number, row.name, unit)
         if unit.drive:
-            yield from _ranked(ZEROS, joint.drive(row, unit.drive))
+            yield from _with_rank(ZEROS, joint.drive(row, unit.drive))
         if place == 0:
-            yield from _ranked(BASE, joint.shifts("on the base"))
+            yield from _with_rank(BASE, joint.shifts("on the base"))
         else:
             yield from _errors_of_link(joint, row.units[place - 1].name, last_point, NO_LINK * rows.length)
         point = unit.point or last_point or ZERO
         if unit.kind != "ball":
-            yield from _ranked(TILTS, joint.tilts(point))
+            yield from _with_rank(TILTS, joint.tilts(point))
         if unit.kind == "universal":
-            yield from _ranked(OFFSETS, joint.between_axes(point))
+            yield from _with_rank(OFFSETS, joint.between_axes(point))
         if unit.bars:
-            yield from _ranked(LENGTHS, joint.bars(unit.bars, row.coordinate[unit.first]))
+            yield from _with_rank(LENGTHS, joint.bars(unit.bars, row.coordinate[unit.first]))
         last_point = unit.point or last_point
     axes = [Vector(*column) for column in rows.rotation.T.tolist()]
     last_joint, end = _JointErrors(number, row.name, row.units[-1]), len(row.twists)
@@ -176,16 +176,16 @@ def _errors_of_link(
     """
     point = joint.unit.point
     if point is None or last_point is None:
-        yield from _ranked(LINKS, joint.shifts("on its link"))
+        yield from _with_rank(LINKS, joint.shifts("on its link"))
     elif (span := point - last_point).norm() > no_link:
         along = span * (1.0 / span.norm())
         yield LENGTHS, joint.length(along, joint_before)
-        yield from _ranked(LINKS, joint.shifts("on its link", along))
+        yield from _with_rank(LINKS, joint.shifts("on its link", along))
     elif joint.unit.kind != "ball":
-        yield from _ranked(OFFSETS, joint.shifts("on its link"))
+        yield from _with_rank(OFFSETS, joint.shifts("on its link"))
 
 
-def _ranked(rank: int, sources: Iterable[ErrorSource]) -> Iterator[tuple[int, ErrorSource]]:
+def _with_rank(rank: int, sources: Iterable[ErrorSource]) -> Iterator[tuple[int, ErrorSource]]:
     return ((rank, source) for source in sources)
 
 
