@@ -86,6 +86,15 @@ def test_a_motor_feels_its_drive_through_the_screw(tmp_path):
     assert plain.drives[0].inertia_ratio is None
 
 
+@pytest.mark.parametrize(
+    ("lead", "linear"), [((), True), (("drives.lead=10 mm",), False), (("drives.lead=6.283185307179586 m",), False)]
+)
+def test_motors_count_as_linear_only_where_the_file_gives_no_lead(tmp_path, lead, linear):
+    """A lead of 2 pi m turns the rotor by 1 rad in 1 m, as a linear motor has it by convention."""
+    answer = answer_of(tmp_path, UP, *MASS, *lead)
+    assert any("gives no lead" in sentence for _, sentence in DRIVES.sentences(answer)) is linear
+
+
 def test_friction_of_a_guide_loads_the_screw_and_bends_what_holds_the_tool(tmp_path):
     """That of the rotor does neither: it acts before the screw, and behind the spring of the drive."""
     quiet, plain, rubbing = (
