@@ -69,8 +69,8 @@ ASIDE = 1e-4
 error of central differences."""
 COMMENT_WIDTH = 117
 """Characters in a line of a comment, as in our own files."""
-LINE_SEARCH = 0.25
-"""Factor by which source.c shortens a step of forward kinematics that does not come nearer, see `forward` there."""
+SHORTENING = 0.25
+"""Factor by which `machine_forward` shortens a step that does not come nearer: a half would try twice as often."""
 SWEEPS = 30
 """Sweeps of Jacobi's rotations at most: they converge quadratically, and ten are enough for hundreds of springs."""
 AGREED = 1e-10
@@ -212,18 +212,18 @@ def _program(functions: MachineFunctions, name: str, body: Body) -> PrintedProgr
     count = len(functions.inputs)
     names = [f"in[{k}]" if k < count else f"state[{k - count}]" for k in range(len(body.columns))]
     printed = print_graph(body.columns, names, body.results, body.code)
+    end = f"return (int)({printed.code});"
     lines = [*printed.first]
-    if printed.condition:
+    if printed.condition:  # only then the rest is computed
         lines.append(f"if (!({printed.condition})) {{")
         lines += [f"    for (int k = 0; k < {len(printed.results)}; k++) {{", "        out[k] = NAN;", "    }"]
-        lines += [f"    return (int)({printed.code});", "}"]
-    lines += [*printed.then, *(f"out[{k}] = {value};" for k, value in enumerate(printed.results))]
-    lines.append(f"return (int)({printed.code});")
-    state = "const double *state, " if len(body.columns) > count else ""
-    unused = [f"(void){word};" for word in ("in", "state") if not any(f"{word}[" in line for line in lines)]
-    unused = [line for line in unused if state or "state" not in line]
+        lines += [f"    {end}", "}"]
+    lines += [*printed.then, *(f"out[{k}] = {value};" for k, value in enumerate(printed.results)), end]
+    arguments = ["in", "state"] if len(body.columns) > count else ["in"]
+    unused = [f"(void){word};" for word in arguments if not any(f"{word}[" in line for line in lines)]
     text = "".join(f"    {line}\n" for line in [*unused, *lines])
-    head = f"/* {printed.operations} operations. */\nstatic int {name}(const double *in, {state}double *out)\n"
+    parameters = ", ".join([*(f"const double *{word}" for word in arguments), "double *out"])
+    head = f"/* {printed.operations} operations. */\nstatic int {name}({parameters})\n"
     return PrintedProgram(name, f"{head}{{\n{text}}}\n", printed.operations)
 
 
@@ -260,7 +260,8 @@ def _source(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> 
         numbers["LENGTH"] = functions.length
     if functions.square:
         constants.append(f"static const int IS_SLIDE[MACHINE_ACTUATORS] = {{{sliding}}};")
-        numbers |= {"CLOSED": CLOSED, "SHORTEST_SHARE": SHORTEST_SHARE, "STEPS_FORWARD": STEPS_FORWARD}
+        numbers |= {"CLOSED": CLOSED, "STEPS_FORWARD": STEPS_FORWARD}
+        numbers |= {"SHORTEST_SHARE": SHORTEST_SHARE, "SHORTENING": SHORTENING}
     if functions.rests:
         numbers |= {"STATES": functions.states, "STEPS_AT_REST": MOST_NEWTON_STEPS, "ONE_STEP_AWAY": ONE_STEP_AWAY}
         numbers |= {"COMMANDED": COMMANDED, "STEPS_OF_COMMAND": STEPS_OF_COMMAND}
@@ -304,7 +305,7 @@ def _state_lines(functions: MachineFunctions) -> list[str]:
 def _header(functions: MachineFunctions, programs: Sequence[PrintedProgram]) -> str:
     """Return NAME.h: arguments and results of the functions, with units, and the work that they do at most."""
     work = {program.name: program.operations for program in programs}
-    trials = 1 + math.ceil(math.log(SHORTEST_SHARE) / math.log(LINE_SEARCH))
+    trials = 1 + math.ceil(math.log(SHORTEST_SHARE) / math.log(SHORTENING))
     work["forward"] = STEPS_FORWARD * (work["actuator_slopes_at"] + trials * work["actuators_at"])
     if functions.rests:
         work["rest"] = work["first_steps_at"] + MOST_NEWTON_STEPS * work["step_at"] + work["displacement_at"]

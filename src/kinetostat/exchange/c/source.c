@@ -119,7 +119,7 @@ int machine_forward(const machine_real coordinates[], machine_real in[])
         double there = 0.0;
         int nearer = 0;
         /* A step that leads no nearer is shortened; near the solution that is round-off, and the end. */
-        for (double share = 1.0; !nearer && share > SHORTEST_SHARE; share *= 0.25) {
+        for (double share = 1.0; !nearer && share > SHORTEST_SHARE; share *= SHORTENING) {
             for (int j = 0; j < MACHINE_INPUTS; j++) {
                 next[j] = at[j] + (j < MACHINE_COORDINATES ? share * off[j] : 0.0);
             }
