@@ -339,7 +339,7 @@ def _list_columns(machine: Machine, rows: Sequence[Mapping[str, float | str]]) -
 
 def _row(machine: Machine, row: Mapping[str, float | str], where: str) -> dict[str, float]:
     """A pose of a list by leaf path, SI."""
-    values_of_row = {}
+    values_of_row: dict[str, float] = {}
     for name, field in listed_fields(machine, row, where).items():
         values_of_row |= dict.fromkeys(field.leaves, _value(row[name], field.quantity, f"{where}.{name}"))
     return values_of_row
