@@ -6,6 +6,7 @@ that of the target on the platform. Residuals are in standard deviations.
 Source: theory (64); exact places and rates are those of theory (46) and (48).
 """
 
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 
@@ -69,8 +70,9 @@ class Observation:
     row_poses: Integers
     sigma: Array
     measured: Array
-    # Not a part of the constructor, so that a copy with other fields does not take over answers of this one.
-    _last_linearisation: dict[bytes, tuple[Array, Array]] = field(init=False, default_factory=dict)
+    # The last linearisation, with the bytes of its values. It is not a part of the constructor, so that a copy with
+    # other fields does not take over answers of this one.
+    _last: deque[tuple[bytes, tuple[Array, Array]]] = field(default_factory=lambda: deque(maxlen=1), init=False)
 
     @property
     def turns(self) -> Mask:
@@ -95,11 +97,12 @@ class Observation:
         the values where the one before it has ended.
         """
         key = values.tobytes()
-        if key not in self._last_linearisation:
-            linearisation = self._new_linearisation(values)
-            self._last_linearisation.clear()
-            self._last_linearisation[key] = linearisation
-        return self._last_linearisation[key]
+        for last_key, last_linearisation in tuple(self._last):
+            if last_key == key:
+                return last_linearisation
+        linearisation = self._new_linearisation(values)
+        self._last.append((key, linearisation))  # replaces the last one in one step, so that threads may share it
+        return linearisation
 
     def _new_linearisation(self, values: Array) -> tuple[Array, Array]:
         model, errors, per_spring = self.model, self.errors(values), self._deflections_per_spring
