@@ -4,6 +4,7 @@ A recipe is a section with these blocks, read in order:
 
     ```python src/kinetostat/...    a new file of that name; or, if it exists, lines for it: the first or the last line
     ```toml src/kinetostat/...      of the block stands in the file exactly once, and the others go below or above it
+    ```md docs/...
     ```sh recipe                    commands that must succeed afterwards, in an empty folder
     ```text recipe                  what the last of them says, as elsewhere in the documentation
 """
@@ -83,10 +84,12 @@ def test_lines_go_below_or_above_the_line_that_is_quoted(added, after, tmp_path)
 
 
 def copy_of_the_project(tree: Path) -> Path:
-    """A new folder with the package and its tests."""
+    """A new folder with what the recipes change: the package, its tests and the overview."""
     beside = shutil.ignore_patterns("*.pyc.*")  # what other processes are writing; what they have compiled comes along
     shutil.copytree(ROOT / "src", tree / "src", ignore=beside)
     shutil.copytree(ROOT / "tests", tree / "tests", ignore=shutil.ignore_patterns("*.pyc*"))
+    (tree / "docs").mkdir()
+    shutil.copy(ROOT / "docs" / "overview.md", tree / "docs")
     return tree
 
 
