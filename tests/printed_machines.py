@@ -4,10 +4,9 @@ import numpy as np
 
 from kinetostat import load
 from kinetostat.engine.kernel import closes_inside
-from kinetostat.engine.machine_functions import ENTRIES
 from kinetostat.engine.points import PointTable
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.kinetostatics.quantities import ENTRIES, QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import bundled
 from kinetostat.machine.machine import Machine

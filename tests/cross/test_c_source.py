@@ -15,10 +15,10 @@ from scipy.optimize import least_squares
 from kinetostat import build, export, load
 from kinetostat.engine.batch import evaluate
 from kinetostat.engine.derivatives import evaluate_gradient
-from kinetostat.engine.machine_functions import ENTRIES
 from kinetostat.engine.points import PointTable
 from kinetostat.kinematics.forward import stand
 from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.quantities import ENTRIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import bundled
 from kinetostat.machine.parameters import values, with_values

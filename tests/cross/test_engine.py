@@ -102,7 +102,7 @@ def read(response: Response) -> list[float]:
 def scales(found: Array) -> Array:
     """What each quantity is compared with: for entries of K and C the mean of their diagonals, else itself."""
     result = np.abs(found)
-    for first in (0, len(POSITIONS)):
+    for first in (NAMES.index("compliance_rx"), NAMES.index("stiffness_rx")):
         diagonal = [first + POSITIONS.index((i, i)) for i in range(6)]
         for k, (i, j) in enumerate(POSITIONS, first):
             with np.errstate(invalid="ignore"):

@@ -11,11 +11,11 @@ from browser import browser, needs_chromium
 
 from kinetostat import analyze, export, load
 from kinetostat.engine.batch import evaluate
-from kinetostat.engine.machine_functions import ENTRIES
 from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.state import state_of
 from kinetostat.kinematics.forward import stand
 from kinetostat.kinematics.status import Status
+from kinetostat.kinetostatics.quantities import ENTRIES
 from kinetostat.machine.parameters import values, with_values
 from kinetostat.studies.attribution import by_part
 from kinetostat.views.live_page import viewer

@@ -49,8 +49,6 @@ from kinetostat.vibration.springwise import ModeCounts, SpringSizes, mode_counts
 
 LOADS = frozenset(("force", "moment", "gravity", "preload", "temperature_rise"))
 """Words of leaf paths that load a machine."""
-ENTRIES = [name for name in QUANTITIES if name.partition("_")[0] in ("compliance", "stiffness")]
-"""Quantities that are the entries of C and then of K, on and above the diagonal."""
 DISPLACEMENTS = [name for name in QUANTITIES if name.startswith("displacement_")]
 """Quantities that are the motion of the tool under the loads: rotation vector, then displacement."""
 STEPS_FORWARD = 30

@@ -22,7 +22,6 @@ from kinetostat.engine.form import TraceOptions, each_alone, objectives_of, plan
 from kinetostat.engine.gradient import with_gradients
 from kinetostat.engine.machine_functions import (
     DISPLACEMENTS,
-    ENTRIES,
     SHORTEST_SHARE,
     STEPS_FORWARD,
     MachineFunctions,
@@ -41,7 +40,7 @@ from kinetostat.exchange.formats import ascii_line
 from kinetostat.frozen import dataclass
 from kinetostat.kinematics.forward import stand
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.kinetostatics.quantities import ENTRIES, QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.link import Parallelogram
 from kinetostat.machine.parameters import with_values

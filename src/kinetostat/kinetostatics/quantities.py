@@ -344,11 +344,16 @@ def _loaded_quantities() -> list[MapQuantity]:
     ]
 
 
+_ENTRY_QUANTITIES = (
+    *_entry_quantities("compliance", "C", _compliance_unit, "less"),
+    *_entry_quantities("stiffness", "K", _stiffness_unit, "more"),
+)
+ENTRIES = [quantity.name for quantity in _ENTRY_QUANTITIES]
+"""Names of the entries of C and then of K, on and above the diagonal, row by row."""
 QUANTITIES = {
     quantity.name: quantity
     for quantity in (
-        *_entry_quantities("compliance", "C", _compliance_unit, "less"),
-        *_entry_quantities("stiffness", "K", _stiffness_unit, "more"),
+        *_ENTRY_QUANTITIES,
         *_free_stiffness_quantities(),
         MapQuantity("singularity_margin", "1", "singularity margin", attrgetter("singularity_margin"), better="more"),
         MapQuantity("mass", "kg", "moving mass", attrgetter("mass"), better="less"),

@@ -24,7 +24,6 @@ from kinetostat.engine.form import TraceOptions, each_alone, objectives_of, plan
 from kinetostat.engine.gradient import with_gradients
 from kinetostat.engine.machine_functions import (
     DISPLACEMENTS,
-    ENTRIES,
     SHORTEST_SHARE,
     STEPS_FORWARD,
     MachineFunctions,
@@ -37,7 +36,7 @@ from kinetostat.engine.printed import NOTATION, pack_graph
 from kinetostat.engine.rest import MOST_NEWTON_STEPS, step_of
 from kinetostat.engine.trace import Body
 from kinetostat.kinematics.status import Status
-from kinetostat.kinetostatics.quantities import QUANTITIES
+from kinetostat.kinetostatics.quantities import ENTRIES, QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import as_toml
 from kinetostat.machine.machine import Machine
