@@ -106,6 +106,10 @@ NEARLY_DEPENDENT = 1e-4
 freedoms, which are faster, keep eight digits of a step above it, and the next step brings the others."""
 DEPENDENT = 1e-6
 """Singular value of unit screws below which they are dependent: half of the digits are lost in a square root."""
+SINGULAR_LEG = 1e-6
+"""Determinant of the twists of a leg's joints, in rad and in units of the machine's length, up to which the leg counts
+as singular and has no assembly mode. It is the product of all singular values: several that are merely small also make
+it so, and then any solution of the leg is taken."""
 NEGLIGIBLE_COMPONENT = 1e-9
 """Share of a screw's largest component below which another one is round-off and is not written out."""
 PARALLEL_AXES = 1e-12

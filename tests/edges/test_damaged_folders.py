@@ -209,6 +209,8 @@ def test_no_file_of_a_finished_folder_is_damaged_unseen(kind, damage, finished, 
         assert code == NO_ANSWER, (name, said)
         assert name in said.err
         if (kind, name, damage) == ("grid", "map.nc", "removed"):
+            assert "no longer there" in said.err
+            assert "damaged or lost" not in said.err
             assert "Remove the folder" in said.err
             continue
         once_more(kind, folder)

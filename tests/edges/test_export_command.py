@@ -194,6 +194,7 @@ def test_ranges_with_holes_are_refused_with_some_without(tmp_path, capsys):
         ("tricept", [], "has no x and no y and no z"),
         ("zhang-gosselin-4dof", [], "has no y,"),
         ("delta", ["--over", "x=0 mm:1 mm:3"], "ranges of x and of y with at least three points"),
+        ("delta", ["--over", "x=1 mm:9 mm:3:log", "--over", "y=0 mm:9 mm:3"], "needs evenly spaced points"),
         ("delta", [*HEIGHTS[:4], "--over", "x=0 m:0.9 m:3", "--over", "y=0 m:0.1 m:3"], "no mesh with holes"),
         ("delta", ["--inputs", "x"], "The format klipper has no inputs to choose"),
     ],

@@ -74,6 +74,7 @@ def test_a_percent_more_stiffens_by_the_percentage(data):
 
 def test_statements_hold_at_the_poses_that_they_say(paper):
     """Pose by pose, by machines of their own."""
+    assert any(s.text.startswith("Increasing ") and "\N{NO-BREAK SPACE}%" in s.text for s in statements(paper))
     about_z = next(s for s in statements(paper) if s.topic == "compliance" and s.text.startswith("About z "))
     own = [guidelines(load(MACHINE, [f"pose.x={x}", f"pose.z={z}"])) for x in (-0.02, -0.01, 0, 0.01, 0.02)
            for z in (0.66, 0.67, 0.68, 0.69, 0.70)]  # fmt: skip

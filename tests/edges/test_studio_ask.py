@@ -54,6 +54,7 @@ def test_a_question_is_answered_about_the_machine_as_it_is():
         assert modes(load(MACHINE, [HEAVY])).message in text
         assert text.count("<table") == 3
         assert re.search(r'<img alt="[A-Z][^"]{20,}" src="data:image/svg', text)
+        await page.choose("question", "sweep")  # the answer that is shown keeps its name
         assert await downloaded(page, "json") == ("modes.json", json_of(VIBRATION, modes(load(MACHINE, [HEAVY]))))
         assert [page.one(f"question-{form}").visible for form in ("json", "csv", "nc")] == [True] * 3
         assert not page.one("question-line").text
@@ -170,6 +171,11 @@ def test_files_that_were_sent_are_listed():
             await page.upload(name, b"1", "upload poses")
         assert form.files["poses"] == {"a.csv": b"1", "b.csv": b"1"}
         assert page.one("sent poses").text == "a.csv, b.csv"
+        for i in range(2, tab.MOST_FILES):
+            await page.upload(f"{i}.csv", b"1", "upload poses")
+        await page.upload("b.csv", b"2", "upload poses")  # again, where there is no room for another one
+        assert len(form.files["poses"]) == tab.MOST_FILES
+        assert form.files["poses"]["b.csv"] == b"2"
 
     on_page(steps, MACHINE)
 

@@ -38,6 +38,12 @@ def test_what_a_file_may_not_say_is_refused(path, text, words):
         read_numbers(load(MACHINE).family, {path: text})
 
 
+@pytest.mark.parametrize("field", ["copies", "angles", "mirrored"])
+def test_a_field_of_a_leg_needs_the_name_of_the_leg(field):
+    with refused(f'--set "legs.{field}=3": the name after legs is "{field}"'):
+        load("tripteron", [f"legs.{field}=3"])
+
+
 def test_out_of_bounds_is_refused():
     with refused(r"base_radius is -0\.1 m: it must be greater"):
         changed(load(MACHINE), {"geometry.base_radius": -0.1})

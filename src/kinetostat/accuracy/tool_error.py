@@ -156,7 +156,7 @@ class FirstOrder(NamedTuple):
     Attributes:
         mean: the error of the average machine, as a size [n x measures].
         rms: root of the mean square over all machines [n x measures].
-        rss: the root of the sum of squares of the errors by each limit alone [n x measures].
+        rss: the mean, plus the root of the sum of squares of what each limit alone adds [n x measures].
         worst: the largest error that the limits allow [n x measures].
     """
 

@@ -86,6 +86,8 @@ def slide_travel(start: Vector, end: Vector, direction: Vector, rod: Scalar) -> 
 def squared_distance(first: tuple[Vector, Vector], second: tuple[Vector, Vector]) -> Scalar:
     """Return the square of the least distance of two line segments, each given by its ends, m².
 
+    Neither segment may be a point.
+
     Source: C. Ericson, Real-Time Collision Detection (2005), section 5.1.9, with choices in place of branches.
     """
     along, across, between = first[1] - first[0], second[1] - second[0], first[0] - second[0]

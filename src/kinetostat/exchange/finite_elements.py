@@ -4,7 +4,6 @@ All three get the machine as one linear elastic element at a node; K itself come
 """
 
 from collections.abc import Callable, Iterator
-from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -23,8 +22,11 @@ DEGREES_OF_FREEDOM = ("x", "y", "z", "rx", "ry", "rz")
 TOOL, GROUND = 1, 2
 """Numbers of the nodes in the files."""
 DMIG_NAME = "KTOOL"
+"""Name of the matrix in the file for Nastran, by which K2GG selects it."""
 FIELD_WIDTH = 16
 """Characters of a field in Nastran's large format."""
+MOST_DIGITS = 10
+"""Decimals of a positive number, whose exponent has two digits, that fill such a field."""
 ENTRIES_PER_LINE = 4
 """Matrix entries in one line of an Abaqus file."""
 CONSTANTS_PER_COMMAND = 6
@@ -114,11 +116,8 @@ def _card(name: str, *fields: str) -> str:
 
 def _nastran_number(value: float) -> str:
     """Return a double-precision number with as many digits as a field has room for."""
-    for digits in count(10, -1):
-        text = f"{value:.{digits}E}".replace("E", "D")
-        if len(text) <= FIELD_WIDTH:
-            return text
-    raise ValueError("no number needs more than 16 characters")
+    texts = (f"{value:.{digits}E}".replace("E", "D") for digits in range(MOST_DIGITS, -1, -1))
+    return next(text for text in texts if len(text) <= FIELD_WIDTH)
 
 
 def abaqus_text(stiffness: ToolStiffness) -> str:

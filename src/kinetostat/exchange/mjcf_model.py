@@ -20,7 +20,7 @@ from kinetostat.tolerances import COINCIDENT_HINGES
 from kinetostat.validation.pieces import Piece, StrutPiece, array, joint_of, moves_in, pieces
 
 MOST_HINGES = 5
-"""Most hinges of one body: a sixth coordinate would make it free, for which the engine has a joint of its own."""
+"""Most hinges of one body: the engine takes six coordinates of a body, of which one is left for a slide."""
 
 
 @dataclass(frozen=True)

@@ -22,12 +22,12 @@ from kinetostat.machine.leg import rows_about_one_point
 from kinetostat.numerics.iteration import largest, least_norm, newton
 from kinetostat.tolerances import (
     CLOSED,
-    DEPENDENT,
     LEAST_DIVISOR,
     LEAST_GAP_SETTLED,
     NEWTON_SETTLED,
     NO_CONTRACTION,
     NO_CURVATURE,
+    SINGULAR_LEG,
 )
 
 MOST_TRIALS = 80
@@ -265,7 +265,7 @@ def same_mode(problems: Problems, unknowns: Array, goal: Coordinates) -> Mask:
     """
     if problems.free:
         return np.ones(len(unknowns), dtype=bool)
-    at_goal, at_home = signs(problems, unknowns, goal), signs(problems, 0.0 * unknowns, problems.at_home())
+    at_goal, at_home = signs(problems, unknowns, goal), signs(problems, np.zeros_like(unknowns), problems.at_home())
     return np.asarray(at_goal * at_home >= 0.0)
 
 
@@ -285,7 +285,7 @@ def signs(problems: Problems, unknowns: Array, goal: Coordinates) -> Array:
     if len(rows) != rates.shape[2]:
         return np.zeros(len(rates))
     result = np.linalg.det(rates[:, rows])
-    result = np.where(np.abs(result) > DEPENDENT, result, 0.0)
+    result = np.where(np.abs(result) > SINGULAR_LEG, result, 0.0)
     for ball in _balls(problems):
         result = result * np.linalg.det(rates[:, :3, ball])
     return np.asarray(np.sign(result))

@@ -321,18 +321,18 @@ def _reversal_quantities() -> list[MapQuantity]:
 def _loaded_quantities() -> list[MapQuantity]:
     entries = []
     for i, name in enumerate(COMPONENTS):
-        shown, unit = rf"\mathrm{{{name}}}", "rad" if i in ROTATIONS else "m"
+        shown, motion_unit = rf"\mathrm{{{name}}}", "rad" if i in ROTATIONS else "m"
         motion = partial(_displacement, row=i)
         tangent, free = partial(_loaded_number, name="stiffness", row=i), partial(_tangent_free, row=i)
-        stiff = _stiffness_unit(i, i)
+        stiffness_unit = _stiffness_unit(i, i)
         rows: list[tuple[str, str, str, Callable[[Response], Scalar], Better, str]] = [
-            ("displacement", unit, rf"$u_{{{shown}}}$", motion, None, "displacement"),
-            ("tangent_stiffness", stiff, rf"$K_{{t,{shown}}}$", tangent, "more", "stiffness"),
-            ("tangent_free_stiffness", stiff, rf"$1/C_{{t,{shown}}}$", free, "more", "compliance"),
+            ("displacement", motion_unit, rf"$u_{{{shown}}}$", motion, None, "displacement"),
+            ("tangent_stiffness", stiffness_unit, rf"$K_{{t,{shown}}}$", tangent, "more", "stiffness"),
+            ("tangent_free_stiffness", stiffness_unit, rf"$1/C_{{t,{shown}}}$", free, "more", "compliance"),
         ]
-        for start, label, symbol, value, better, loaded in rows:
+        for start, unit, symbol, value, better, loaded in rows:
             entries.append(
-                MapQuantity(f"{start}_{name}", label, symbol, value, components=(name,), better=better, loaded=loaded)
+                MapQuantity(f"{start}_{name}", unit, symbol, value, components=(name,), better=better, loaded=loaded)
             )
     entries += _frequency_quantities("loaded_frequency", "frequency")
     factor, slack, snapped = (partial(_loaded_number, name=name) for name in ("factor", "slack", "snapped"))
@@ -418,7 +418,7 @@ def needs_state(machine: Machine, names: Iterable[str], limited: bool = True) ->
     names = list(names)
     wanted = [QUANTITIES[name] for name in names]
     beyond = any(quantity.modal or quantity.cables for quantity in wanted) or needs_motion(names)
-    return beyond or bool(rest_numbers(machine, [quantity.name for quantity in wanted], limited))
+    return beyond or bool(rest_numbers(machine, names, limited))
 
 
 INDICES: dict[str, Iterable[object]] = {

@@ -26,9 +26,9 @@ from kinetostat.spec.tolerance_table import tolerance_lines
 
 LONGEST_EDITED_TEXT = 1 << 17
 """Characters of a file that is edited: tomlkit needs a second for as many."""
-MOST_EDITS = 3
-"""Edits until the machine is the same: one as a rule, two where a link's cross-section becomes a number and a mass. A
-machine that differs after three will not be the same after more; its file is then written afresh."""
+MOST_EDITS = 2
+"""Edits until the machine is the same: one as a rule, two where a link's cross-section becomes a number and a mass. The
+file of a machine that differs after the last one is written afresh."""
 TABLES_WITH_NAMES = ("joints", "links")
 """Tables of a leg whose entries have names."""
 
@@ -74,12 +74,13 @@ def _edited_text(written: Written, machine: Machine) -> str | None:
             container = _table_at(document, table)
             if isinstance(container, dict | list):  # else one value stands for all entries, and one of them was set
                 _put(container, key, setting_value(value.strip()))
-        for _ in range(MOST_EDITS):
+        for edits_left in reversed(range(MOST_EDITS + 1)):
             edited = tomlkit.dumps(document)
             present = build(edited, machine.name)
             if _is_same(present, machine):
                 return edited
-            _write_differences(document, present, machine)
+            if edits_left:
+                _write_differences(document, present, machine)
     except (TOMLKitError, InputError, LookupError, TypeError, ValueError):
         return None
     return None

@@ -150,8 +150,8 @@ class Budget(ImmutableAnswer):
         """One statistic of a measure at each pose, SI [n].
 
         Args:
-            statistic: "mean" (of the average machine), "rms" (root mean square), "rss" (root of the sum of squares of
-                what the limits do one by one), "usual" (what 95 % of all machines keep within) or "worst".
+            statistic: "mean" (of the average machine), "rms" (root mean square), "rss" (mean plus root of
+                the sum of squares of what each limit adds), "usual" (what 95 % of all machines keep within) or "worst".
             measure: one of `measures`.
 
         Raises:

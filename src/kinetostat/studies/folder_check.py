@@ -61,6 +61,8 @@ class StepsCheck:
     def sentence(self) -> str:
         """The result in words."""
         missing = f" {self.missing:,} are still to be computed." if self.missing else ""
+        if self.removed:
+            return f"The file of the grid is no longer there; {self.damaged:,} {self.parts} were in it."
         if not self.whole:
             frame = "" if self.frame else " The structure of its file is damaged."
             return f"{self.damaged:,} {self.parts} are damaged or lost, {self.intact:,} are there.{frame}"

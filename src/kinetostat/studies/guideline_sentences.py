@@ -21,8 +21,9 @@ DECIDING_SHARE = 0.01
 """Share of an entry of C from which on an element is named as one that decides it: a lesser one is below the usual
 uncertainty of a stiffness."""
 RATIO_OF_LIMITS = 10.0
-"""Ratio of limits of rigidity above which directions get a limit each. Within it the greatest serves for all: twice as
-much would ask for parts that are needlessly stiff, half would write a clause for nearly every direction."""
+"""Ratio of neighbouring limits of rigidity above which directions get a limit each. Within it the greatest serves
+for all: twice as much would ask for parts that are needlessly stiff, half would write a clause for nearly every
+direction."""
 LEAST_EFFECT = 0.005
 """Percent per percent below which a sentence says that a parameter has no effect: some hundredth of a usual effect."""
 MOST_PARAMETERS = 8
@@ -126,7 +127,7 @@ def _limits_of_rigidity(answer: Guidelines, roles: Roles) -> Iterator[Statement]
 
 
 def _clusters(factors: Mapping[int, float]) -> list[list[int]]:
-    """Directions by rising factor, in groups that lie more than a power of ten apart."""
+    """Directions by rising factor, in groups that lie more than `RATIO_OF_LIMITS` apart; a chain is one group."""
     groups: list[list[int]] = []
     for i in sorted(factors, key=lambda i: factors[i]):
         if groups and factors[i] <= RATIO_OF_LIMITS * factors[groups[-1][-1]]:
@@ -157,7 +158,7 @@ def _effects_of_parameters(answer: Guidelines) -> Iterator[Statement]:
         falling = sorted(((i, p) for i, p in directions if p < -LEAST_EFFECT), key=lambda pair: pair[1])
         none = [answer.components[i] for i, p in directions if abs(p) <= LEAST_EFFECT]
         clauses = [
-            f"{word} in {', '.join(f'{answer.components[i]} {p:+.2g}' for i, p in pairs)}"
+            f"{word} in {', '.join(_signed_percent(answer.components[i], p) for i, p in pairs)}"
             for word, pairs in (("stiffer", rising), ("softer", falling))
             if pairs
         ]
@@ -206,6 +207,10 @@ def _share_of_poses(is_true: Mask) -> float:
 def _most_gaining(gains: Array) -> Integers:
     """The number of the element that gains most [components x poses]; the first one if several gain alike."""
     return np.asarray(np.nan_to_num(gains).round(6).argmax(axis=0))
+
+
+def _signed_percent(name: str, percent: float) -> str:
+    return f"{name} {percent:+.2g}\N{NO-BREAK SPACE}%"
 
 
 def _percents(least: float, most: float) -> str:

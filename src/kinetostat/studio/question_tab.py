@@ -110,6 +110,7 @@ class AskTab:
         self._asked: Machine | None = None  # the machine of the answer that is shown or being computed
         self._process: asyncio.subprocess.Process | None = None
         self._folder: TemporaryDirectory[str] | None = None  # with the files of the answer that is shown
+        self._answered_word = ""  # the question of that answer
         self._stopped = self._busy = False
         self._questions = Lane(_import_questions, self._offer)
         with ui.element("section").classes("design of-asking left").props('aria-label="question"'):
@@ -214,9 +215,10 @@ class AskTab:
     ) -> None:
         """Keep a file that was sent until the question is asked; where there is no room, the first one goes."""
         sent = form.files.setdefault(option.name, {})
-        if len(sent) == (MOST_FILES if option.many else 1):
+        name = _safe(event.file.name)
+        if name not in sent and len(sent) == (MOST_FILES if option.many else 1):
             sent.pop(next(iter(sent)))
-        sent[_safe(event.file.name)] = await event.file.read()
+        sent[name] = await event.file.read()
         names.set_text(", ".join(sent))
         if isinstance(event.sender, ui.upload):
             event.sender.reset()
@@ -265,7 +267,7 @@ class AskTab:
                 self.answer.set_content(paragraph(NOTHING_ASKED))
             return
         self._forget()
-        self._folder = folder
+        self._folder, self._answered_word = folder, str(request["word"])
         self.answer.set_content(str(content))
         for form, button in self.files.items():
             button.set_visibility((place / f"{ANSWER_STEM}.{form}").exists())
@@ -324,7 +326,7 @@ class AskTab:
 
     def _send(self, form: str) -> None:
         if self._folder is not None:
-            ui.download.file(Path(self._folder.name) / f"{ANSWER_STEM}.{form}", f"{self.choice.value}.{form}")
+            ui.download.file(Path(self._folder.name) / f"{ANSWER_STEM}.{form}", f"{self._answered_word}.{form}")
 
 
 def _import_questions(words: tuple[str, ...]) -> dict[str, Question]:

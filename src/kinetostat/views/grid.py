@@ -323,7 +323,7 @@ def map_or_carrying_legs(
     """Evaluate quantities over two parameters or more, or find which legs carry there.
 
     Raises:
-        InputError: a single range, quantities of legs that carry, or what `evaluate_grid` or `carrying_legs` refuses.
+        InputError: a single range, quantities of legs that carry, or what `map_question` or `carrying_legs` refuses.
     """
     if not carrying:
         return answer(map_question(machine, ranges, quantities), progress)

@@ -193,8 +193,9 @@ def check_paths(document: Document, settings: Iterable[str]) -> None:
     for setting in settings:
         path, *names = setting.partition("=")[0].strip().split(".")
         table: Any = document.get(path)
-        for name in names[:2] if path == "legs" else ():
-            if isinstance(table, dict) and name not in table and not (name in COPY_KEYS and name == names[1]):
+        for depth, name in enumerate(names[:2] if path == "legs" else ()):
+            is_about_copies = depth == 1 and name in COPY_KEYS
+            if isinstance(table, dict) and name not in table and not is_about_copies:
                 choice(name, table, f"--set {shorten(setting)}: the name after {path}")
             table = table.get(name) if isinstance(table, dict) else None
             path = f"{path}.{name}"
