@@ -25,6 +25,7 @@ FREEDOMS = {
     "revolute": 1, "prismatic": 1, "helical": 1, "parallelogram": 1, "cylindrical": 2, "universal": 2, "planar": 3,
     "spherical": 3, "fixed": 0,
 }  # fmt: skip
+"""Freedoms of the types of joints that drawn machines have."""
 SLIDES = {"prismatic": 1, "parallelogram": 1, "cylindrical": 1, "planar": 2}
 """Freedoms of these that are translations; no more than three of a leg are independent."""
 

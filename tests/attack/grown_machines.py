@@ -390,6 +390,6 @@ def parts_of(document: Document) -> Counter[str]:
 
 
 def parts() -> list[str]:
-    """Every type of joint, motor and link model that there is."""
-    drives = [f"motor {kind}" + (f" {name}" if name else "") for kind in JOINT_TYPES for name, _ in motors(kind)]
-    return [*(f"joint {kind}" for kind in JOINT_TYPES), *drives, *(f"link {model}" for model in MODELS)]
+    """Every link model that there is, and every type of joint that drawn machines have, with every motor of it."""
+    drives = [f"motor {kind}" + (f" {name}" if name else "") for kind in legs.FREEDOMS for name, _ in motors(kind)]
+    return [*(f"joint {kind}" for kind in legs.FREEDOMS), *drives, *(f"link {model}" for model in MODELS)]

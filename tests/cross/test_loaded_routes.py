@@ -9,7 +9,6 @@ from kinetostat.engine.loaded import NATIVE_FROM, Way, loaded_fill
 from kinetostat.engine.points import PointTable
 from kinetostat.equilibrium.cut import cut_machine
 from kinetostat.kinematics.status import Status
-from kinetostat.machine.loading import bundled
 from kinetostat.machine.parameters import values, with_values
 from machines import hangprinter, load_without_limits
 from refusals import refused
@@ -76,9 +75,9 @@ def poses_near(machine, count, share=0.01):
 
 
 def test_which_machines_are_cut_and_which_of_them_have_legs_that_close_loops():
-    cuts = {name: cut_machine(load_without_limits(name)) for name in bundled()}
-    assert {name for name, found in cuts.items() if found is not None} == CUT | WITH_LEGS | {"cogiro"}
-    assert {name for name, found in cuts.items() if found is not None and found.legs} == WITH_LEGS
+    cuts = {name: cut_machine(load_without_limits(name)) for name in CUT | WITH_LEGS | {"cogiro"}}
+    assert all(found is not None for found in cuts.values())
+    assert {name for name, found in cuts.items() if found.legs} == WITH_LEGS
 
 
 def test_legs_of_a_file_are_rods_while_their_slides_point_along_them():

@@ -13,7 +13,16 @@ from kinetostat.kinematics.closure import solve_joints
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.machine import springs
 from kinetostat.machine.parameters import values, with_values
-from machines import CASES, every_machine, few, is_regular, one_of_each, regular_machines, stiffness_paths
+from machines import (
+    CASES,
+    elastic_machine,
+    every_machine,
+    few,
+    is_regular,
+    one_of_each,
+    regular_machines,
+    stiffness_paths,
+)
 from numeric import U, array, assert_blocks_close, columns, lost, trace_product
 
 SAME = 1e-11
@@ -41,7 +50,7 @@ def stacked(chosen):
     return {path: column for path, column in leaves.items() if np.isfinite(column).all()}
 
 
-@every_machine
+@elastic_machine
 @few
 @given(data=st.data())
 def test_arrays_give_the_same_numbers_pose_by_pose(case, data):
