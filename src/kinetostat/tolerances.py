@@ -307,6 +307,9 @@ to `CLOSED`, and their condition costs a digit. Away from home, rigid parts that
 SURELY_MORE = 1e-6
 """The same share above which it is surely more. Between the two nobody can say whether rigid parts share a load, and
 the answer says so; of a thousand random poses none lies there."""
+LEAST_LOAD_OF_DRIVE = 1e-100
+"""Load of a drive per unit of a wrench that stands for 0 where its reciprocal is a wrench: far below every load that is
+not 0, and so large that the squares of its reciprocal are finite."""
 UNREACHED_COMPONENT = 1e-18
 """Square of `CLOSING_ROUND_OFF`: share of the squared size of a screw below which a rigid or free spring does not reach
 along a component. Without it, round-off times infinity would make entries of K or C infinite."""

@@ -192,6 +192,8 @@ def test_a_quantity_of_none_of_them_is_refused():
         compare(["hexapod", STIFFER], quantities=["frequncy"])
     with pytest.raises(InputError, match="not from both"):
         compare(["hexapod", STIFFER], ["x=0:1 cm:2"], poses={"x": [0.0]})
+    with pytest.raises(InputError, match="not from both"):  # before any design is read
+        compare(["hexapod", "no-such-machine"], ["x=0:1 cm:2"], poses={"x": [0.0]})
     only = compare(["hexapod", "planar-3rpr"], quantities=["compliance_z"]).rows[-1]
     assert (only.name, only.values[1]) == ("compliance_z", None)
 

@@ -183,6 +183,7 @@ def test_bundled_files_fulfil_the_schema(name, schema):
         ('type = "revolute"', 'type = "revolve"'),
         ('joins = ["base"', 'join = ["base"'),
         ('family = "legs"', 'family = "leg"'),
+        ('name   = "', 'name   = "\\u0007'),
     ],
 )
 def test_the_schema_refuses_what_the_reader_refuses(old, new, schema):

@@ -14,7 +14,7 @@ from kinetostat.machine.loading import load
 from kinetostat.studies.analysis import analyze
 from kinetostat.studies.optimisation.assessment import Assessor, DesignVerdict
 from kinetostat.studies.optimisation.log import front_of
-from kinetostat.studies.optimisation.search import search, search_into
+from kinetostat.studies.optimisation.search import optimize, search, search_into
 from kinetostat.studies.study_folder import study_folder
 from refusals import refused
 from studies import PAPER, SMALL, best, problem, written
@@ -270,3 +270,10 @@ def test_stiffness_is_bought_with_mass():
     np.testing.assert_allclose(objectives[:, 0] / diameter**2, objectives[0, 0] / diameter[0] ** 2, rtol=1e-9)
     with refused("is not known"):
         written(SMALL, "objectives.0.quantity=mass")
+
+
+def test_a_search_without_a_folder_stops_after_the_step_when_it_is_told_to():
+    study = written(SMALL + "[optimizer]\npopulation = 10\ngenerations = 4\n")
+    steps = []
+    optimize(study, watch=lambda done, *_: steps.append(done), stop=lambda: len(steps) == 2)
+    assert steps == [1, 2]

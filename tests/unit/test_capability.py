@@ -9,7 +9,7 @@ import pytest
 
 import kinetostat
 from driven_sets import LINEAR, MACHINES, greatest_motion, greatest_wrench
-from kinetostat import InputError, capability, drives, dynamics, evaluate, load, save
+from kinetostat import InputError, build, capability, drives, dynamics, evaluate, load, save
 from kinetostat.numerics.polytopes import outline, reach_along, vertices
 from kinetostat.views.capability import CAPABILITY, capability_figures
 
@@ -188,3 +188,40 @@ def test_a_machine_whose_pose_has_no_place_is_refused_accelerations_in_a_sentenc
     with pytest.raises(InputError, match=rf"has no place at .*({reason})") as refused:
         ask(machine)
     assert len(str(refused.value)) < 400
+
+
+def crank_leg(name, motor, elbow, wrist):
+    return {
+        "name": name,
+        "joints": [
+            {"name": joint, "type": "revolute", "joins": bodies, "point": [*point, 0.0], "axis": [0, 0, 1], **more}
+            for joint, bodies, point, more in (
+                ("motor", ["base", "crank"], motor, {"actuated": True, "stiffness": 5e3}),
+                ("elbow", ["crank", "rod"], elbow, {}),
+                ("wrist", ["rod", "platform"], wrist, {}),
+            )
+        ],
+    }
+
+
+def test_a_crank_in_line_with_its_rod_stops_the_motion_along_them():
+    """At the dead point the drive has no load, and no finite rate of it moves the platform along the rod."""
+    machine = build(
+        {
+            "schema": 1,
+            "name": "dead point",
+            "family": "legs",
+            "space": "planar",
+            "platform": {"point": [0.0, 1.0, 0.0]},
+            "pose": {"x": 0.0, "y": 1.0, "yaw": 0.0},
+            "legs": [
+                crank_leg("a", (-4.0, 1.0), (-2.0, 1.0), (-1.0, 1.0)),
+                crank_leg("b", (-1.0, -1.0), (-2.0, 0.0), (0.0, 1.0)),
+                crank_leg("c", (3.0, -1.0), (3.0, 0.0), (1.0, 0.5)),
+            ],
+            "limits": {"actuator_moment": 100.0, "actuator_turning_speed": 1.0},
+        }
+    )
+    least = {part.name: part.least for part in capability(machine).sets}
+    assert least["speed"] == pytest.approx(0.0, abs=1e-90)
+    assert least["rate"] == pytest.approx(4.0)

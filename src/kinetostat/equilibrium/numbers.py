@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
-from kinetostat.algebra.scalar import Scalar, smaller, where
+from kinetostat.algebra.scalar import Scalar, larger, where
 from kinetostat.arrays import Array, Integers
 from kinetostat.equilibrium.balance import Balance
 from kinetostat.equilibrium.solving import Stabilities, at_rest, stabilities
@@ -117,7 +117,7 @@ def greatest_loads(loads: Sequence[tuple[Spring, Scalar]]) -> dict[str, Scalar]:
     result: dict[str, Scalar] = {}
     for spring, load in loads:
         size, name = abs(load), LOADS_OF_ACTUATORS[0 if spring.joint.point is None else 1]
-        result[name] = -smaller(-size, -result[name]) if name in result else size
+        result[name] = larger(size, result[name]) if name in result else size
     return result
 
 

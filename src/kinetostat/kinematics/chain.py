@@ -26,7 +26,8 @@ class PlacedChain:
     """A chain somewhere, at n poses.
 
     Attributes:
-        before: displacement of what each number of motions carries, before the errors there [motions + 1].
+        before: before[k] is the displacement of what the first k motions carry, without the errors that stand behind
+            these [motions + 1].
         end: displacement of the platform's end.
         screws: the screws of each motion in its place [n x motions x 6].
     """

@@ -24,7 +24,7 @@ from kinetostat.machine.leg import Leg, Spring
 from kinetostat.machine.leg_screws import LegScrews
 from kinetostat.machine.limits import is_set
 from kinetostat.machine.machine import Configuration
-from kinetostat.tolerances import DEPENDENT_GENERATORS, UNREACHED_COMPONENT
+from kinetostat.tolerances import DEPENDENT_GENERATORS, LEAST_LOAD_OF_DRIVE, UNREACHED_COMPONENT
 
 BLOCKS = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 """Components of a screw that turn, and that move."""
@@ -140,7 +140,8 @@ def _by_drives(
     if len(rows) > len(wrenches):
         return None, []
     if len(wrenches) == 1:
-        return [wrenches[0] * (1.0 / rows[0][0])], []
+        load = rows[0][0]  # 0 at a dead point, where a crank is in line with its rod and cannot move the platform
+        return [wrenches[0] * (1.0 / where(abs(load) > LEAST_LOAD_OF_DRIVE, load, LEAST_LOAD_OF_DRIVE))], []
     amounts, null, _ = right_inverse([list(row) for row in rows])
     driving = [combine(wrenches, [row[k] for row in amounts]) for k in range(len(rows))]
     return driving, [combine(wrenches, column) for column in null]
@@ -261,7 +262,7 @@ def greatest_ball(faces: Sequence[Face], block: slice, length: Scalar) -> Scalar
 
     Args:
         faces: faces of the set of wrenches.
-        block: one of `BLOCKS`.
+        block: one of `BLOCKS`, or a single component of one.
         length: characteristic length, m.
 
     Source: theory (83).

@@ -142,7 +142,7 @@ def _written_file() -> Schema:
     return _table(
         {
             "schema": {"const": SCHEMA_VERSION},
-            "name": {"type": "string", "minLength": 1, "maxLength": LONGEST_MACHINE_NAME},
+            "name": {"type": "string", "minLength": 1, "maxLength": LONGEST_MACHINE_NAME, "pattern": PRINTABLE},
             "family": {"const": NAME, "description": SUMMARY},
             "space": {"enum": ["spatial", "planar"], "description": "planar: the x-y plane"},
             "platform": _table({"point": {**POINT, "description": "P at the home pose, base frame"}}, ["point"]),

@@ -28,7 +28,7 @@ MOST_TIMES = 100.0
 CONTRAST = 1e22
 """Factor by which stiffnesses of one machine may differ, in SI: from 1e24 on round-off hides the stiffer."""
 SOFTEST_PLAUSIBLE = 100.0
-"""N/m: a part that gives 10 mm under 1 N can be neither a drive nor a link of a machine."""
+"""N/m: a part that deflects by 10 mm under 1 N can be neither a drive nor a link of a machine."""
 
 
 class HasFields(Protocol):

@@ -222,7 +222,7 @@ def _misfit_of_one(value: Any, kind: Any, name: str) -> Misfit | None:
         if not _is_row(value, len(inside) if origin is tuple else None, origin is Collection):
             return misfit
         if float in _alternatives(inside[0]) and all(type(entry) is float for entry in value):
-            return None  # thousands of numbers are not looked at one by one
+            return None  # thousands of floats need no closer look
         return _first(_misfit(entry, inside[0], f"{name}[{place}]") for place, entry in enumerate(value))
     if origin is not None:
         if not isinstance(value, Mapping):

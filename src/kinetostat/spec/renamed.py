@@ -1,6 +1,7 @@
 """Public words of earlier versions and what they are called now, with the warning that an old word causes.
 
-An old word keeps working for one version. To rename one, add it to `RENAMED`; nothing else needs to know the old word.
+An old word keeps working for one version. Names of quantities and keys of JSON data are renamed in `RENAMED`, an
+attribute at its class, by `former_names` or `renamed_property`.
 """
 
 import sys
@@ -10,8 +11,8 @@ from types import MappingProxyType
 from typing import Any, Literal, TypeVar
 
 AnyClass = TypeVar("AnyClass")
-WordKind = Literal["quantity", "JSON key", "attribute"]
-"""Kinds of public words: names of quantities, keys of JSON data, attributes of classes in Python."""
+WordKind = Literal["quantity", "JSON key"]
+"""Kinds of public words that `RENAMED` lists: names of quantities, keys of JSON data."""
 
 PACKAGE = __name__.partition(".")[0]
 """The name with which all modules of kinetostat begin."""
@@ -30,7 +31,6 @@ RENAMED: Mapping[WordKind, Mapping[str, str]] = MappingProxyType(
             "energy": "net_energy",
             "energy_over_time": "net_energy_over_time",
         },
-        "attribute": {"sections": "tables", "own_sections": "family_tables", "every_section": "every_table"},
     }
 )
 """The new word for each old one, by kind of word."""
@@ -91,8 +91,8 @@ def former_names(**current: str) -> Callable[[type[AnyClass]], type[AnyClass]]:
 def with_former_keys(data: dict[str, Any], table: Mapping[str, str]) -> dict[str, Any]:
     """Return JSON data in which values stand under their old keys as well as under the present ones.
 
-    Tables and lists inside the data are treated in the same way. The old keys that were added are listed at the top
-    under "deprecated_keys", so that a program that reads them can tell.
+    Tables and lists inside the data are treated in the same way. The old keys that were added are listed under
+    "deprecated_keys" at the top level, so that a program that reads them can tell.
 
     Args:
         data: the data with the present keys; it is not changed.

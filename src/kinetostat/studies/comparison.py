@@ -95,7 +95,7 @@ class Comparison(ImmutableAnswer):
 
     Attributes:
         designs: the designs in order; the others are compared with the first.
-        differences: fields that differ, of those that two designs have at least.
+        differences: fields that at least two designs have and that do not agree.
         rows: numbers at the pose of each design.
         softest: the softest rotation and translation of each design; fewer where it has none.
         verdicts: verdicts on the requirements of all files, each judged for every design; None where a design lacks the
@@ -182,9 +182,9 @@ def compare(
         raise InputError(
             f"compare takes 2 to {MOST_DESIGNS} designs, not {len(designs)}; give files, names or NAME:path=value."
         )
-    analysed = tuple(_analysed_designs(designs))
-    if ranges and poses is not None:
+    if ranges and poses is not None:  # first, since analyses of designs take much longer
         raise InputError("the poses come from a list or from ranges, not from both; leave one of them out.")
+    analysed = tuple(_analysed_designs(designs))
     for design in analysed:
         _refuse_absent(design, ranges)
     analyses, names, where = [design.analysis for design in analysed], as_list(quantities), ""

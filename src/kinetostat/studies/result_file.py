@@ -214,8 +214,9 @@ class ResultFile:
         written = "0"
         with writing(self._path, KEPT_SENTENCE):
             for name, offset in self._offsets.items():
-                data = np.ascontiguousarray(status if name == STATUS else values[name])
-                self._stream.seek(offset + start * data.itemsize)
+                given, dtype = (status, np.int8) if name == STATUS else (values[name], np.float64)
+                data = np.ascontiguousarray(given, dtype=dtype)
+                self._stream.seek(offset + start * _width(name))
                 self._stream.write(data.data)
                 written = checksum(data.data.cast("B"), written)
             settle(self._stream)

@@ -1,7 +1,7 @@
 """The computations behind the page: a picture, a report, a map, curves, a ranking, modes, their swing, a motion.
 
-Each is a function of a request, which stands before it with its answer. They run in threads (`lanes`), so they take and
-return frozen data and touch no page. The formulas are elsewhere.
+Each is a function of a request, which stands before it with its answer; that of the modes takes a machine. They run in
+threads (`lanes`), so they take and return frozen data and touch no page. The formulas are elsewhere.
 """
 
 import math

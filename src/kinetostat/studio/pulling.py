@@ -33,7 +33,7 @@ MOST_ASIDE = 5.0
 FAINT_EFFECT = 1e-3
 """Share of the largest effect on a part from which a number counts as one that moves it."""
 DIFFERENCE_STEP = 1e-6
-"""Step of finite differences, in units of the machine's length or in rad: half of the digits are left to slopes."""
+"""Step of forward differences, in units of the machine's length or in rad: slopes keep about six digits."""
 MOST_PULL_STEPS = 6
 """Greatest number of steps of a pull: the next position of the pointer goes on from where these have led."""
 MOST_HALVINGS = 4
@@ -89,7 +89,10 @@ class Pull:
 
 
 def handles(configuration: Configuration, axes: tuple[str, ...]) -> list[Handle]:
-    """Return the handles: of the platform at P along some axes, and of joints of actuated legs but those on rails."""
+    """Return the handles: of the platform at P along some axes, and of the joints of actuated legs.
+
+    A joint on the base that slides on a rail has none.
+    """
     legs = [part for leg in configuration.legs if (part := anatomy(leg)).actuated]
     joints = [Handle(BASE, leg.leg, leg.foot) for leg in legs if not leg.on_rail]
     joints += [Handle(HEAD, leg.leg, leg.head) for leg in legs]

@@ -103,7 +103,7 @@ def mass_matrices(masses: Masses, rates: Sequence[PartRates], length: Array) -> 
         yield masses.names[first], (product + product.mT) * coupled[:, first, None, None]
 
 
-def energy_of(masses: Masses, rates: Sequence[PartRates], motion: Array, length: Array) -> Scalar:
+def twice_kinetic_energy(masses: Masses, rates: Sequence[PartRates], motion: Array, length: Array) -> Scalar:
     """Return twice the kinetic energy of some masses in a motion of their coordinates; see `mass_matrices`."""
     along_motion = [
         replace(part, velocity=(part.velocity @ motion)[..., None], angular=(part.angular @ motion)[..., None])

@@ -39,7 +39,13 @@ from kinetostat.machine.machine import Configuration, Machine
 from kinetostat.machine.parameters import parameters
 from kinetostat.numerics.motions import of_scalars, still
 from kinetostat.tolerances import CLOSING_ROUND_OFF, UNRESISTED
-from kinetostat.vibration.inertia import energy_of, leg_rates, mass_matrices, platform_inertia, platform_rates
+from kinetostat.vibration.inertia import (
+    leg_rates,
+    mass_matrices,
+    platform_inertia,
+    platform_rates,
+    twice_kinetic_energy,
+)
 from kinetostat.vibration.modes import frequencies, hertz, mass_matrix, motions_left_out, solved_modes, stiffness_matrix
 
 EQUAL_INVERSE_SQUARES = 1e-9
@@ -324,13 +330,14 @@ class MachineOfKnownModes:
         """
         mechanism = self.mechanism
         twist = mechanism.ways @ of_scalars(mode.platform)[0]
-        kinetic = energy_of(mechanism.platform, platform_rates(mechanism.platform, still(1)), twist, mechanism.length)
+        platform = mechanism.platform
+        kinetic = twice_kinetic_energy(platform, platform_rates(platform, still(1)), twist, mechanism.length)
         strain, opening_work = 0.0, 0.0
         amounts = np.zeros((1, len(mechanism.actuators) + mechanism.growth.shape[1]))  # relaxed links have not grown
         for leg, rates, force in zip(mechanism.legs, mode.legs, mode.forces, strict=True):
             motion = of_scalars(rates)[0]
             placed = leg.chain.place(np.zeros((1, leg.size)).astype(object), amounts.astype(object))
-            kinetic = kinetic + energy_of(leg.masses, leg_rates(leg, placed), motion, mechanism.length)
+            kinetic = kinetic + twice_kinetic_energy(leg.masses, leg_rates(leg, placed), motion, mechanism.length)
             kinetic = kinetic + mechanism.length[0] * total(list(leg.rotors[0] * motion * motion))
             strain = strain + total(list(leg.stiffness[0] * motion * motion))
             end_twist = placed.screws[0].T @ (leg.chain.follows @ motion)

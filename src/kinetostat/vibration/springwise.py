@@ -38,7 +38,7 @@ from kinetostat.kinetostatics.response import Response
 from kinetostat.machine.machine import Machine
 from kinetostat.numerics.motions import of_scalars
 from kinetostat.tolerances import SURELY_MORE, UNRESISTED
-from kinetostat.vibration.inertia import energy_of, leg_rates, mass_matrices, platform_inertia
+from kinetostat.vibration.inertia import leg_rates, mass_matrices, platform_inertia, twice_kinetic_energy
 from kinetostat.vibration.scalar_frequencies import SPARE_MODES, platform_alone
 
 Modal: TypeAlias = Literal["free", "loaded", "factor"]
@@ -281,7 +281,7 @@ class SpringMotions:
         machine, tangent, length = self._machine, self._tangent, self._machine.mechanism.length
         kinetic = twist @ (self._inertia @ twist)
         for leg, elastic, motion in zip(tangent.legs, machine.legs, leg_motions, strict=True):
-            kinetic = kinetic + energy_of(elastic.masses, leg_rates(elastic, leg.placed), motion, length)
+            kinetic = kinetic + twice_kinetic_energy(elastic.masses, leg_rates(elastic, leg.placed), motion, length)
             kinetic = kinetic + length[0] * total(list(elastic.rotors[0] * motion * motion))
         return kinetic / (unknowns @ unknowns + self._work_of_turning(twist, leg_motions))
 

@@ -31,7 +31,7 @@ else:
 MOST_BARS = 15
 """Single tolerances that have bars, at most: as many as a page has lines beside the other panels."""
 LEAST_LABEL_WIDTH = 4.0
-"""Least room for the labels of bars, inches: most paths fit."""
+"""Least room for the labels of bars, inches: most names of tolerances fit."""
 BARS_WIDTH, ROW_HEIGHT, ROOM_FOR_TITLE = 2.4, 0.24, 1.4
 """Width of the panels of bars beside their labels, height of a row, and of title, scale and notes, inches."""
 BAR_HEIGHT = 0.8

@@ -161,7 +161,8 @@ def _object(fields: Sequence[Field | Records], item: Any) -> dict[str, Any]:
 def csv_of(description: Description, answer: Any) -> str:
     """Return the first records of an answer as CSV: a row for each, numbered from 1.
 
-    Names that a spreadsheet would take for a formula have an apostrophe before them.
+    Names that a spreadsheet would take for a formula have an apostrophe before them, and a cell is empty where a number
+    is not known (NaN), as in `columns_csv`.
     """
     records = next(part for part in description.fields if isinstance(part, Records) and "csv" in part.forms)
     shown, items = [part for part in records.fields if "csv" in part.forms], records.of(answer)
@@ -190,7 +191,7 @@ def _heads(part: Field, entries: Sequence[str] | None) -> list[str]:
 def _cells(part: Field, item: Any, entries: Sequence[str] | None) -> list[Any]:
     value = part.of(item)
     cells = [value] if entries is None else [value.get(name) for name in entries]
-    return [no_formula(cell) if isinstance(cell, str) else cell for cell in cells]
+    return [_cell(cell) for cell in cells]
 
 
 def netcdf_of(description: Description, answer: Any) -> bytes:

@@ -119,7 +119,7 @@ def optimize(
         folder: where every step is kept, so that a search that was stopped goes on; None to keep nothing.
         watch: called with the progress and the best objective.
         resume: whether the folder must hold a part of the search.
-        stop: called after each step of a search with a folder; True ends it with the result so far.
+        stop: called after each step; True ends the search with the result so far.
 
     Raises:
         InputError: another study or another process in the folder, nothing to resume, a full disk.
@@ -127,17 +127,19 @@ def optimize(
     if resume and folder is None:
         raise InputError("resume is True, but there is no folder; give the folder of the search that was stopped.")
     assess = Assessor(problem)
-    log = search(assess, watch) if folder is None else search_into(assess, Path(folder), watch, resume, stop)
+    log = search(assess, watch, stop) if folder is None else search_into(assess, Path(folder), watch, resume, stop)
     return result_of(assess, log)
 
 
-def search(assess: Assessor, watch: Watch = ignore_progress) -> Log:
-    """Search in memory and return the log of all designs."""
+def search(assess: Assessor, watch: Watch = ignore_progress, stop: Stop = never) -> Log:
+    """Search in memory, until `stop` returns True after a step, and return the log of all designs."""
     log = Log(assess.problem)
     method = method_of(assess)
     while len(log.steps) < method.steps:
         _take(method, log)
         watch(len(log.steps), method.steps, log.steps[-1].get("best"))
+        if stop():
+            break
     return log
 
 
