@@ -26,7 +26,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 FENCE = re.compile(r"^(?P<indent> *)```(?P<info>[^\n`]*)\n(?P<text>.*?)^(?P=indent)```$", re.MULTILINE | re.DOTALL)
-KINDS = ("toml", "csv", "sh", "console", "python", "c", "text", "xml", "matlab", "ini", "")
+KINDS = ("toml", "csv", "sh", "console", "python", "c", "text", "xml", "matlab", "ini", "md", "")
 
 
 @dataclass(frozen=True)

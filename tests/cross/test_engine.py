@@ -27,7 +27,7 @@ from kinetostat.machine.machine import Machine
 from kinetostat.machine.parameters import with_values
 from kinetostat.motion.response import response_in_motion
 from kinetostat.motion.rigid import MotionPlan
-from machines import CASES, Case, every_machine, one_of_each, stiffness_paths
+from machines import CASES, Case, elastic_machine, every_machine, one_of_each, stiffness_paths
 from numeric import lost
 
 Columns = dict[str, Array]
@@ -158,7 +158,7 @@ def test_equals_floats_whatever_varies(case: Case) -> None:
     assert_same(native(machine, columns), by_floats(machine, columns))
 
 
-@every_machine
+@elastic_machine
 def test_equals_arrays(case: Case) -> None:
     machine, columns = case.machine, drawn(case, "", 2001, seed=2)
     found = native(machine, columns)

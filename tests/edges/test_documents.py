@@ -58,7 +58,7 @@ class Reader:
         self.names: dict[str, object] = {"__name__": "__main__"}
 
     def do(self, block):
-        if block.words and (block.words == ("recipe",) or block.words[0].startswith(("src/", "tests/"))):
+        if block.words and (block.words == ("recipe",) or block.words[0].startswith(("src/", "tests/", "docs/"))):
             return None  # a step of a recipe: test_recipes.py follows it
         return getattr(self, f"do_{block.kind or 'quotation'}")(block)
 
