@@ -15,7 +15,7 @@ from kinetostat.kinetostatics.quantities import QUANTITIES
 from kinetostat.kinetostatics.response import respond
 from kinetostat.machine.loading import load
 from kinetostat.machine.parameters import parameters, values, with_values
-from machines import CASES, KINDS, elastic_machine, elastic_paths, every_machine, few, one_of_each, regular_machines
+from machines import CASES, KINDS, elastic_machine, elastic_paths, few, one_of_each, regular_machines
 
 CLOSE = 1e-7
 """Of the largest share in a derivative along a direction: differences near a singularity keep some eight digits."""
@@ -94,7 +94,7 @@ def test_differences_with_more_digits_agree(case, data):
         assert abs(float(expected) - shares.sum()) <= CLOSE * max(np.abs(shares).max(), abs(value)), name
 
 
-@every_machine
+@elastic_machine
 @few
 @given(data=st.data())
 def test_compliance_falls_as_all_stiffnesses_grow(case, data):

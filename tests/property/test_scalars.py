@@ -16,7 +16,6 @@ from kinetostat.machine.parameters import values, with_values
 from machines import (
     CASES,
     elastic_machine,
-    every_machine,
     few,
     is_regular,
     one_of_each,
@@ -105,7 +104,7 @@ def some_machines(case, count=40):
         yield with_values(case.machine, {path: float(value) for path, value in drawn.items()})
 
 
-@every_machine
+@elastic_machine
 @few
 @given(data=st.data())
 def test_float64_is_right_to_its_condition(case, data):
