@@ -260,6 +260,28 @@ STRETCH = 2e5
 """Stiffness of these cables, N/m."""
 
 
+ARM = """
+schema = 1
+name = "arm"
+family = "legs"
+space = "planar"
+[platform]
+point = ["0.5 m", "0.3 m", 0]
+[pose]
+x = "0.5 m"
+y = "0.3 m"
+yaw = 0
+[[legs]]
+name = "arm"
+joints = [
+  { name = "shoulder", type = "revolute", joins = ["base", "upper"], point = [0, 0, 0], axis = [0, 0, 1], actuated = true, stiffness = 1e5 },
+  { name = "elbow", type = "revolute", joins = ["upper", "lower"], point = [0.5, 0, 0], axis = [0, 0, 1], actuated = true, stiffness = 1e5 },
+  { name = "wrist", type = "revolute", joins = ["lower", "platform"], point = [0.5, 0.3, 0], axis = [0, 0, 1], actuated = true, stiffness = 1e5 },
+]
+"""  # noqa: E501
+"""Two links, 0.5 m and 0.3 m long, and a wrist, all driven: it reaches a ring, whatever the yaw."""
+
+
 def column(force: float) -> Machine:
     """A column of 2 m on a hinge of 5 kN·m/rad, which a force (N) presses: it stands up to 2500 N."""
     hinge = (

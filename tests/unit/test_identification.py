@@ -21,7 +21,7 @@ from kinetostat.studies.identification.measurements import POSITION, ROTATION, M
 from kinetostat.studies.identification.next_poses import chosen_poses, first_poses
 from kinetostat.studies.identification.observation import FRAME_UNKNOWNS, TARGET_UNKNOWNS, observation, place_unknown
 from kinetostat.studies.identification.unseen import sparse
-from machines import load_without_limits
+from machines import ARM, load_without_limits
 from synthetic_measurements import posed
 
 
@@ -207,25 +207,6 @@ def test_a_crank_may_be_commanded_beyond_half_a_turn(tmp_path):
     assert math.remainder(turned.coordinate - math.radians(-181.0), math.tau) == pytest.approx(0.0, abs=1e-9)
 
 
-ARM = """
-schema = 1
-name = "arm"
-family = "legs"
-space = "planar"
-[platform]
-point = ["0.5 m", "0.3 m", 0]
-[pose]
-x = "0.5 m"
-y = "0.3 m"
-yaw = 0
-[[legs]]
-name = "arm"
-joints = [
-  { name = "shoulder", type = "revolute", joins = ["base", "upper"], point = [0, 0, 0], axis = [0, 0, 1], actuated = true, stiffness = 1e5 },
-  { name = "elbow", type = "revolute", joins = ["upper", "lower"], point = [0.5, 0, 0], axis = [0, 0, 1], actuated = true, stiffness = 1e5 },
-  { name = "wrist", type = "revolute", joins = ["lower", "platform"], point = [0.5, 0.3, 0], axis = [0, 0, 1], actuated = true, stiffness = 1e5 },
-]
-"""  # noqa: E501
 """One leg with three actuators."""
 
 

@@ -18,6 +18,7 @@ from kinetostat.studies.datasets import field_of
 from kinetostat.studies.workspace import workspace
 from kinetostat.studies.workspace_verdicts import BEYOND, INSIDE, Judge, depth
 from kinetostat.views.answers import plot
+from machines import ARM
 from machines import load_without_limits as load
 from refusals import refused
 
@@ -26,27 +27,6 @@ ERRORS = 4
 
 RIM = 1e-9
 """Distance from the end of the reach, m, within which rounding decides."""
-
-ARM = """
-schema = 1
-name = "arm"
-family = "legs"
-space = "planar"
-[platform]
-point = ["0.5 m", "0.3 m", 0]
-[pose]
-x = "0.5 m"
-y = "0.3 m"
-yaw = 0
-[[legs]]
-name = "arm"
-joints = [
-  { name = "shoulder", type = "revolute", joins = ["base", "upper"], point = [0, 0, 0], axis = [0, 0, 1], actuated = true, stiffness = 1e5 },
-  { name = "elbow", type = "revolute", joins = ["upper", "lower"], point = [0.5, 0, 0], axis = [0, 0, 1], actuated = true, stiffness = 1e5 },
-  { name = "wrist", type = "revolute", joins = ["lower", "platform"], point = [0.5, 0.3, 0], axis = [0, 0, 1], actuated = true, stiffness = 1e5 },
-]
-"""  # noqa: E501
-"""Two links, 0.5 m and 0.3 m long, and a wrist: it reaches a ring, whatever the yaw."""
 
 SQUARE = ["x=-1 m:1 m:81", "y=-1 m:1 m:81"]
 PLANE = ["x=-40 cm:40 cm:81", "y=-40 cm:40 cm:81"]
